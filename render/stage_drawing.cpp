@@ -5,6 +5,7 @@
 #include "render/particle_rays.h"
 #include "render/stage_impl.h"
 #include "render/texture.h"
+#include "render/trace/light_path.h"
 
 namespace offstage::render {
 namespace {
@@ -25,6 +26,14 @@ std::vector<AirField::Ball> lit_particles(const PaintOrder& order) {
     }
   }
   return result;
+}
+
+/// Returns whether the light that passes a mesh is traced by photons: it is solid glass that turns light.
+/// Light passes smooth panes in a straight line. The visible fraction of the sun is one number for all
+/// colours, so tinted panes have photons, too.
+bool needs_photons(const RayMaterial& material, const RayMesh& mesh) {
+  return material.transmission > 0 && !material.thin &&
+         (is_rough_glass(material.roughness) || material.is_tinted() || !mesh.is_plate());
 }
 
 }  // namespace
@@ -128,24 +137,24 @@ void Stage::Impl::trace_light(std::span<const Instance* const> shown, std::span<
                               std::span<PointSet* const> sets, const View& view, const FrameUniforms& frame,
                               const SampleOffsets& offsets, const StopTest& stop) {
   RayScene& scene = light_pass.scene();
-  scene.clear();
+  scene.clear(time);
   light_sources = {.sun = sun, .sky = sky, .sky_is_visible = environment.visible, .fog = environment.fog};
   light_sources.open_air.constant = frame.irradiance_at(0);
   light_sources.open_air.slope << frame.irradiance_at(3), frame.irradiance_at(1), frame.irradiance_at(2);
   for (const Instance* instance : shown) {
     if (!instance->visible) continue;
     const RayMaterial& material = *instance->material->rays;
-    const bool focuses =
-        instance->casts_shadow && !instance->mesh->endless && material.transmission > 0 && !material.thin;
-    const unsigned object = scene.add(*instance->mesh->rays, material, instance->world_from_mesh,
-                                      instance->casts_shadow, focuses);
+    const RayMesh& mesh = *instance->mesh->rays;
+    const bool focuses = instance->casts_shadow && !instance->mesh->endless && needs_photons(material, mesh);
+    const unsigned object =
+        scene.add(mesh, material, instance->world_from_mesh, instance->casts_shadow, focuses);
     if (object != RayScene::kNone && focuses)
       light_sources.glass.push_back(
           {object, instance->world_from_mesh * instance->mesh->box.min(),
            instance->world_from_mesh.linear() * instance->mesh->box.sizes().asDiagonal()});
     if (object != RayScene::kNone && !material.mean_emission().isZero())
-      light_sources.glow.add(object, *instance->mesh->rays, material, instance->world_from_mesh,
-                             instance->center(), instance->radius(), instance->is_ball());
+      light_sources.glow.add(object, mesh, material, instance->world_from_mesh, instance->center(),
+                             instance->radius(), instance->is_ball());
   }
   light_sources.glow.limit();
   for (const Cloth* cloth : sheets)

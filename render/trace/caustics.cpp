@@ -108,18 +108,20 @@ LightTracer::Photon LightTracer::trace_photon(const Beam& beam, uint32_t number,
     if (!scene_.first_hit(path.from, path.direction, kFar, hit) || (k == 0 && hit.object != piece.object))
       return photon;
     const RayMaterial& material = *hit.material;
-    const Vector4f color = material.color(hit, 0);
+    const RaySurface surface = material.surface(hit, 0, false);
+    const Vector4f& color = surface.color;
     // The photon passes through a hole or a translucent surface.
     if (color.w() < 1 && sampler.next().x >= color.w()) {
       path.from = off_surface(hit.position, -hit.face);
-    } else if (material.transmission <= 0) {
+    } else if (surface.transmission <= 0) {
       photon.pixel = visible.find(hit);
       break;
     } else if (sampler.next().x < mirrored_fraction(hit, path.direction)) {
       path.turn(reflected(path.direction, hit.normal), hit);
     } else {
-      path.fraction = path.fraction.cwiseProduct(
-          enter(hit, material.transmission * color.head<3>(), sampler, path.from, path.direction));
+      path.fraction =
+          path.fraction.cwiseProduct(enter(hit, surface.roughness, surface.transmission * color.head<3>(),
+                                           sampler, path.from, path.direction));
     }
   }
   if (photon.pixel < 0) return photon;

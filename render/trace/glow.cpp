@@ -87,7 +87,7 @@ GlowSample Glow::Source::sample_area(const Vector3f& place, float choice,
   result.towards = offset / result.distance;
   const float cosine = std::abs(result.towards.dot(normal.normalized()));
   if (cosine < 1e-4f) return {};
-  result.radiance = material->emission_at(mesh->uv_at(triangle, b));
+  result.radiance = material->emission_at(mesh->uvs_at(triangle, b));
   result.density = offset.squaredNorm() / (cosine * area_per_chance(triangle));
   return result;
 }

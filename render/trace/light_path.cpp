@@ -13,11 +13,12 @@
 namespace offstage::render {
 namespace {
 
-constexpr int kMostBounces = 16;       // largest number of diffuse surfaces on a path
-constexpr int kMostSteps = 32;         // largest number of surfaces on a path, including mirrors and glass
-constexpr int kAirRays = 8;            // rays from each point in the air
-constexpr float kFaintest = 1e-3f;     // radiance of highlights that need no shadow ray
-constexpr float kSmoothMetal = 0.35f;  // roughness of metals below which a path is reflected
+constexpr int kMostBounces = 16;          // largest number of diffuse surfaces on a path
+constexpr int kMostSteps = 32;            // largest number of surfaces on a path, including mirrors and glass
+constexpr int kAirRays = 8;               // rays from each point in the air
+constexpr float kFaintest = 1e-3f;        // radiance of highlights that need no shadow ray
+constexpr float kMirrorRoughness = 0.3f;  // roughness below which shaders show a mirror image on a dielectric
+constexpr float kSmoothMetal = 0.35f;     // roughness of metals below which a path is reflected
 
 float fresnel_of_glass(float cosine, float ratio) {
   const float sine2 = ratio * ratio * (1 - cosine * cosine);
@@ -27,6 +28,95 @@ float fresnel_of_glass(float cosine, float ratio) {
               p = (cosine - ratio * t) / (cosine + ratio * t);
   return 0.5f * (s * s + p * p);
 }
+
+/// Returns the reflectance in all directions, as sky_reflectance() in shaders/light.glsl. `f0`: reflectance
+/// at perpendicular incidence; `nv`: cosine between the normal and the direction to the eye.
+Vector3f reflectance_of(const Vector3f& f0, float roughness, float nv) {
+  const Vector4f r =
+      roughness * Vector4f(-1, -0.0275f, -0.572f, 0.022f) + Vector4f(1, 0.0425f, 1.04f, -0.04f);
+  const float t = std::min(r.x() * r.x(), std::exp2(-9.28f * nv)) * r.x() + r.y();
+  return f0 * (-1.04f * t + r.z()) + Vector3f::Constant(1.04f * t + r.w());
+}
+
+/// Returns Schlick's approximation of the Fresnel reflectance.
+Vector3f fresnel_at(const Vector3f& f0, float cosine) {
+  const float m = 1 - std::clamp(cosine, 0.0f, 1.0f), grazing = m * m * m * m * m;
+  return f0 + (Vector3f::Ones() - f0) * grazing;
+}
+
+/// Returns the mean of the GGX distribution over a source, times pi, as mean_over_disc() in
+/// shaders/light.glsl. `u`: square of the slope of the half vector; `disc`: square of the radius of the disc
+/// of half vectors.
+float mean_over_disc(float a2, float u, float disc) {
+  const float x = disc / a2, sum = x < 0.01f ? 1 + 0.5f * x : x / (1 + x) + std::log(1 + x) / x;
+  return a2 / ((a2 + std::max(u, disc)) * (a2 + std::max(u - disc, 0.0f)) * sum);
+}
+
+/// Returns the reflectance of a surface at perpendicular incidence.
+Vector3f reflectance_of(const RaySurface& surface) {
+  return surface.reflectance + surface.metallic * (surface.color.head<3>() - surface.reflectance);
+}
+
+/// Returns the fraction of the mirrored light that an occlusion map leaves, as in shaders/mesh.frag.
+float mirrored_fraction_of(float occlusion, float roughness, float nv) {
+  if (occlusion >= 1) return 1;
+  return std::clamp(std::pow(nv + occlusion, std::exp2(-16 * roughness - 1)) - 1 + occlusion, 0.0f, 1.0f);
+}
+
+/// Returns the cosine between the normal and the direction to the origin of the ray.
+float facing_cosine(const Hit& hit, const Vector3f& direction) {
+  return std::clamp(-hit.normal.dot(direction), 1e-3f, 1.0f);
+}
+
+/// Returns the fraction of light that the fibres of a sheen scatter from the sky; see with_layers() in
+/// shaders/mesh.frag.
+float sheen_in_sky(float nv) {
+  const float grazing = 1 - nv;
+  return 0.03f + 0.45f * grazing * grazing * grazing;
+}
+
+/// Returns the fraction of the sun's light that the fibres of a sheen scatter to the eye. `h`: half vector.
+float sheen_in_sun(const Vector3f& normal, float nv, const Vector3f& h, const Vector3f& to_sun) {
+  const float nl = std::max(normal.dot(to_sun), 0.0f), nh = std::clamp(normal.dot(h), 0.0f, 1.0f);
+  const float sine2 = 1 - nh * nh;
+  return 0.75f * sine2 * sine2 / (nl + nv - nl * nv);
+}
+
+/// The fractions of the light of a white surface that a surface in a picture sends to the eye.
+struct Response {
+  Vector3f sun, lamps, around;
+
+  /// Returns the response of a surface that scatters the fraction `albedo` of all light.
+  static Response scattered(const Vector3f& albedo) { return {albedo, albedo, albedo}; }
+  /// Returns the response of a surface that a ray sees, as shade() in shaders/light.glsl and shade_fabric()
+  /// in fabric.glsl. Rough surfaces mirror the light from all around.
+  static Response seen(const Hit& hit, const RaySurface& surface, const Vector3f& direction,
+                       const Vector3f& to_sun) {
+    const Vector3f f0 = reflectance_of(surface), one = Vector3f::Ones();
+    const float nv = facing_cosine(hit, direction), from_sky = sheen_in_sky(nv);
+    const Vector3f mirrored = reflectance_of(f0, surface.roughness, nv);
+    const Vector3f h = (to_sun - direction).normalized();
+    Vector3f diffuse = (1 - surface.metallic) * surface.color.head<3>(), sheen;
+    if (hit.is_cloth) {
+      sheen = hit.material->fabric_sheen.cwiseProduct(surface.color.head<3>().cwiseSqrt());
+      diffuse *= 1 - sheen.maxCoeff() * from_sky;
+    } else {  // add_layers() has already removed the light that the sheen keeps from the surface
+      sheen = hit.material->sheen_color;
+      sheen /= 1 - sheen.maxCoeff() * from_sky;
+    }
+    Response result;
+    result.sun = diffuse.cwiseProduct(one - fresnel_at(f0, -h.dot(direction)));
+    result.lamps = result.around = diffuse.cwiseProduct(one - mirrored);
+    if (surface.roughness >= kSmoothMetal) result.around += mirrored;
+    if (sheen.maxCoeff() > 0) {
+      result.sun += sheen_in_sun(hit.normal, nv, h, to_sun) * sheen;
+      result.lamps += from_sky * sheen;
+      result.around += from_sky * sheen;
+    }
+    result.around *= surface.occlusion;
+    return result;
+  }
+};
 
 float refraction_ratio(const Hit& hit) {
   return hit.front || hit.material->thin ? 1 / hit.material->refraction : hit.material->refraction;
@@ -38,15 +128,15 @@ float mirrored_fraction(const Hit& hit, const Vector3f& direction) {
   return fresnel_of_glass(std::min(-hit.normal.dot(direction), 1.0f), refraction_ratio(hit));
 }
 
-bool is_rough_glass(const RayMaterial& material) {
-  return material.roughness * material.roughness >= kSharp;
+bool is_rough_glass(float roughness) {
+  return roughness * roughness >= kSharp;
 }
 
-Vector3f enter(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Vector3f& from,
+Vector3f enter(const Hit& hit, float roughness, const Vector3f& albedo, PixelSampler& sampler, Vector3f& from,
                Vector3f& direction) {
   from = off_surface(hit.position, -hit.face);
   const Vector3f color = albedo.cwiseMax(0);
-  const float a = hit.material->roughness * hit.material->roughness;
+  const float a = roughness * roughness;
   const bool smooth = a < 1e-3f;
   if (hit.material->thin && smooth) return color;
   const Vector3f n = smooth ? hit.normal : visible_facet(hit.normal, -direction, a, sampler.next());
@@ -190,25 +280,23 @@ Vector3f VisibleLight::direction_through(int x, int y) const {
   return (row_w.dot(direction) > 0 ? direction : Eigen::Vector3d(-direction)).cast<float>();
 }
 
-Vector4f VisibleLight::arriving(int pixel) const {
-  const auto k = static_cast<std::size_t>(pixel);
-  Vector4f result = light_.arriving[k];
-  if (!light_.lamps.empty()) result.head<3>() += light_.lamps[k].head<3>();
-  return result;
+Vector3f VisibleLight::lamps(int pixel) const {
+  if (light_.lamps.empty()) return Vector3f::Zero();
+  return light_.lamps[static_cast<std::size_t>(pixel)].head<3>();
 }
 
 // Refracts or reflects a path at a glass surface, and adds the light that the surface scatters. Returns false
 // if the surface is not glass. To reduce noise, a reflection of less than a tenth is not followed: outside of
 // the glass it shows the sky, and inside its light is added to the refracted light.
-bool LightTracer::follow_glass(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Path& path,
+bool LightTracer::follow_glass(const Hit& hit, const RaySurface& surface, PixelSampler& sampler, Path& path,
                                FoundLight& found) const {
-  const RayMaterial& material = *hit.material;
-  if (material.transmission <= 0) return false;
-  if (hit.front && material.transmission < 1) {
-    const Vector3f light =
-        direct_light(hit, off_surface(hit.position, hit.face), sampler) + sky_met(hit.normal, false, -1);
-    found.noisy += (1 - material.transmission) * path.fraction.cwiseProduct(albedo).cwiseProduct(light);
-    path.fraction *= material.transmission;
+  if (surface.transmission <= 0) return false;
+  const Vector3f albedo = surface.color.head<3>();
+  if (hit.front && surface.transmission < 1) {
+    const Vector3f light = direct_light(hit, off_surface(hit.position, hit.face), sampler).sum() +
+                           sources_.open_air.at(hit.normal);
+    found.noisy += (1 - surface.transmission) * path.fraction.cwiseProduct(albedo).cwiseProduct(light);
+    path.fraction *= surface.transmission;
   }
   const float mirrored = mirrored_fraction(hit, path.direction);
   const Vector3f mirrored_direction = reflected(path.direction, hit.normal);
@@ -218,59 +306,70 @@ bool LightTracer::follow_glass(const Hit& hit, const Vector3f& albedo, PixelSamp
     return true;
   }
   const bool came_by_chance = path.by_chance;
-  path.by_chance |= mirrored >= 0.5f || is_rough_glass(material);
+  path.by_chance |= mirrored >= 0.5f || is_rough_glass(surface.roughness);
   if (mirrored < 0.1f && hit.front) {
     (came_by_chance ? found.noisy : found.certain) +=
         mirrored * path.fraction.cwiseProduct(sky_radiance(sources_.sky, mirrored_direction));
     path.fraction *= 1 - mirrored;
   }
-  path.fraction = path.fraction.cwiseProduct(enter(hit, albedo, sampler, path.from, path.direction));
+  path.fraction =
+      path.fraction.cwiseProduct(enter(hit, surface.roughness, albedo, sampler, path.from, path.direction));
   return true;
 }
 
-// Returns the light of sun and lamps that a surface in a mirror image mirrors. Its lobe is widened by the
-// size of the light source, so that one point of the source is enough.
-Vector3f LightTracer::highlights(const Hit& hit, const Vector3f& albedo, const Path& path) const {
-  const RayMaterial& material = *hit.material;
-  const Vector3f to_eye = -path.direction, from = off_surface(hit.position, hit.face);
-  const Vector3f f0 = material.metallic > 0.5f ? albedo : Vector3f(Vector3f::Constant(0.04f));
-  const float a = material.roughness * material.roughness, nv = std::max(hit.normal.dot(to_eye), 1e-3f);
-  Vector3f sum = Vector3f::Zero();
-  const auto add = [&](const LampPoint<float>& point, bool shadows) {
-    const Vector3f towards = to_eigen(point.towards), h = (towards + to_eye).normalized();
-    const float nl = hit.normal.dot(towards);
-    if (nl <= 0 || hit.face.dot(towards) <= 0) return;
-    const float wide = 0.25f / (std::numbers::pi_v<float> * std::max(point.density, 1e-12f));
-    const float lobe =
-        nl * lobe_of(std::min(std::sqrt(a * a + wide), 1.0f), nl, nv, std::min(hit.normal.dot(h), 1.0f));
-    const float m = 1 - std::clamp(h.dot(to_eye), 0.0f, 1.0f), grazing = m * m * m * m * m;
-    const Vector3f light =
-        lobe * (f0 + (Vector3f::Ones() - f0) * grazing).cwiseProduct(to_eigen(point.arriving));
-    if (light.maxCoeff() < kFaintest) return;
-    sum +=
-        shadows ? Vector3f(light.cwiseProduct(scene_.transmittance(from, towards, point.distance))) : light;
-  };
+// Returns the light of a source that a surface mirrors. The lobe is the mean over the source, as sun_lobe()
+// in shaders/light.glsl, so one point of the source is enough. `reflectance`: at perpendicular incidence.
+Vector3f LightTracer::highlight(const Hit& hit, const LampPoint<float>& point, bool shadows, float roughness,
+                                const Vector3f& reflectance) const {
+  constexpr float kBrightest = 1e4f;
+  const Vector3f to_eye = -hit.direction, from = off_surface(hit.position, hit.face);
+  const Vector3f towards = to_eigen(point.towards), h = (towards + to_eye).normalized();
+  const float nl = hit.normal.dot(towards), nv = facing_cosine(hit, hit.direction);
+  if (nl <= 0 || hit.face.dot(towards) <= 0) return Vector3f::Zero();
+  const float a = std::max(roughness * roughness, 1e-4f);
+  const float disc = 0.25f / (std::numbers::pi_v<float> * std::max(point.density, 1e-12f));
+  const float cosine = std::max(hit.normal.dot(h), 0.01f), cos2 = cosine * cosine;
+  const float slope2 = (h - hit.normal * hit.normal.dot(h)).squaredNorm() / cos2;
+  const float visibility = 0.5f / (2 * nl * nv * (1 - a) + (nl + nv) * a);
+  const float lobe =
+      nl * std::min(mean_over_disc(a * a, slope2, disc) / (cos2 * cos2) * visibility, kBrightest);
+  const Vector3f light = lobe * fresnel_at(reflectance, h.dot(to_eye)).cwiseProduct(to_eigen(point.arriving));
+  if (!shadows || light.maxCoeff() < kFaintest) return light;
+  return light.cwiseProduct(scene_.transmittance(from, towards, point.distance));
+}
+
+Vector3f LightTracer::highlight_of_sun(const Hit& hit, float roughness, const Vector3f& reflectance) const {
   const Sun& sun = sources_.sun;
+  if (sun.intensity <= 0) return Vector3f::Zero();
   const float radius = 0.5f * sun.size_deg * std::numbers::pi_v<float> / 180;
-  if (sun.intensity > 0)
-    add({from_eigen(sources_.sky.sun_direction), kFar, 1, from_eigen(sun.intensity * sun.color),
-         1 / (std::numbers::pi_v<float> * std::max(radius * radius, 1e-8f))},
-        sun.shadows);
+  return highlight(hit,
+                   {from_eigen(sources_.sky.sun_direction), kFar, 1, from_eigen(sun.intensity * sun.color),
+                    1 / (std::numbers::pi_v<float> * std::max(radius * radius, 1e-8f))},
+                   sun.shadows, roughness, reflectance);
+}
+
+// Returns the light of sun and lamps that a surface in a picture mirrors.
+Vector3f LightTracer::highlights(const Hit& hit, float roughness, const Vector3f& reflectance) const {
+  Vector3f sum = highlight_of_sun(hit, roughness, reflectance);
+  const Vector3f from = off_surface(hit.position, hit.face);
   for (const RayLamp& lamp : sources_.lamps)
     if (!lamp.is_sky() && !lamp.def().in_mirrors)
-      add(lamp.point(from_eigen(from), {0.5f, 0.5f}), lamp.def().shadows);
+      sum += highlight(hit, lamp.point(from_eigen(from), {0.5f, 0.5f}), lamp.def().shadows, roughness,
+                       reflectance);
   return sum;
 }
 
 // Returns the light of sun, lamps and glowing meshes on a white surface.
-Vector3f LightTracer::direct_light(const Hit& hit, const Vector3f& from, PixelSampler& sampler) const {
-  Vector3f result = Vector3f::Zero();
+LightTracer::DirectLight LightTracer::direct_light(const Hit& hit, const Vector3f& from,
+                                                   PixelSampler& sampler) const {
+  DirectLight result;
   const float towards_sun = hit.normal.dot(sources_.sky.sun_direction);
   const SquarePoint<float> on_sun = sampler.next();
   if (towards_sun > 0 && sources_.sun.intensity > 0)
-    result = sources_.sun.intensity * towards_sun * sun_visibility(from, on_sun) * sources_.sun.color;
-  return result + lamps_at(from, hit.normal, hit.face, sampler) +
-         glow_at(from, hit.normal, hit.face, sampler);
+    result.sun = sources_.sun.intensity * towards_sun * sun_visibility(from, on_sun) * sources_.sun.color;
+  result.lamps = lamps_at(from, hit.normal, hit.face, sampler);
+  result.glow = glow_at(from, hit.normal, hit.face, sampler);
+  return result;
 }
 
 Vector3f LightTracer::glow_at(const Vector3f& place, const Vector3f& normal, const Vector3f& face,
@@ -283,30 +382,73 @@ Vector3f LightTracer::glow_at(const Vector3f& place, const Vector3f& normal, con
   return light.cwiseProduct(scene_.transmittance(place, sample.towards, kBeforeGlow * sample.distance));
 }
 
-// Reflects a path at a smooth metal and returns true. At other smooth surfaces it adds the sky that their
-// varnish reflects, if the path is sharp, and returns false.
-bool LightTracer::follow_smooth(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, bool sharp,
-                                bool scattered, Path& path, FoundLight& light) const {
+// Returns the sky in the mirrored direction, if nothing is in the way.
+Vector3f LightTracer::mirrored_sky(const Hit& hit, const Path& path) const {
+  Path sky = path;
+  sky.turn(reflected(path.direction, hit.normal), hit);
+  return sky_seen(sky.direction).cwiseProduct(scene_.transmittance(sky.from, sky.direction, kFar));
+}
+
+// Adds the light of the layers over a surface in a picture, as with_layers() in shaders/mesh.frag, and
+// reduces the fraction of the path to that which the layers leave to the surface below.
+void LightTracer::add_layers(const Hit& hit, Path& path, FoundLight& light) const {
   const RayMaterial& material = *hit.material;
-  if (material.roughness >= kSmoothMetal) return false;
-  const float m = 1 - std::min(-hit.normal.dot(path.direction), 1.0f), grazing = m * m * m * m * m;
-  if (material.metallic > 0.5f) {
-    const float a = std::max(material.roughness * material.roughness, scattered ? 0.04f : 1e-4f);
+  const float nv = facing_cosine(hit, path.direction);
+  if (const float coat = material.clearcoat; coat > 0) {
+    const float roughness = material.clearcoat_roughness;
+    const Vector3f f0 = Vector3f::Constant(0.04f);
+    (path.by_chance ? light.noisy : light.certain) +=
+        coat *
+        path.fraction.cwiseProduct(highlight_of_sun(hit, roughness, f0) +
+                                   reflectance_of(f0, roughness, nv).cwiseProduct(mirrored_sky(hit, path)));
+    path.fraction *= 1 - coat * fresnel_at(f0, nv).x();
+  }
+  path.fraction *= 1 - material.sheen_color.maxCoeff() * sheen_in_sky(nv);
+}
+
+// Reflects a path at a smooth metal and returns true. At other smooth surfaces it adds the light that
+// their varnish mirrors, if the path is sharp, and returns false.
+bool LightTracer::follow_smooth(const Hit& hit, const RaySurface& surface, PixelSampler& sampler, bool sharp,
+                                const VisibleLight* visible, Path& path, FoundLight& light) const {
+  if (surface.roughness >= kSmoothMetal) return false;
+  const float nv = facing_cosine(hit, path.direction);
+  const Vector3f mirrored = mirrored_fraction_of(surface.occlusion, surface.roughness, nv) *
+                            (sharp ? reflectance_of(reflectance_of(surface), surface.roughness, nv)
+                                   : fresnel_at(surface.color.head<3>(), -hit.normal.dot(path.direction)));
+  if (surface.metallic > 0.5f) {
+    const float a = std::max(surface.roughness * surface.roughness, path.bounces > 0 ? 0.04f : 1e-4f);
     path.by_chance |= a >= kSharp;
     path.turn(reflected(path.direction, visible_facet(hit.normal, -path.direction, a, sampler.next())), hit);
-    path.fraction = path.fraction.cwiseProduct(albedo + (Vector3f::Ones() - albedo) * grazing);
+    path.fraction = path.fraction.cwiseProduct(mirrored);
     return true;
   }
-  if (sharp) {  // in a mirror image, a varnished surface mirrors only the sky
-    const float fresnel = 0.04f + 0.96f * grazing;
-    Path sky = path;
-    sky.turn(reflected(path.direction, hit.normal), hit);
-    (path.by_chance ? light.noisy : light.certain) +=
-        fresnel * path.fraction.cwiseProduct(sky_seen(sky.direction))
-                      .cwiseProduct(scene_.transmittance(sky.from, sky.direction, kFar));
-    path.fraction *= 1 - fresnel;
-  }
+  if (sharp) add_varnish(hit, surface, mirrored, sampler, visible, path, light);
   return false;
+}
+
+// Adds the light that a varnished surface in a picture mirrors: the scene, if the shaders would show it, too,
+// and otherwise the sky. A varnished surface that is seen in another one mirrors only the sky. `mirrored`:
+// fraction.
+void LightTracer::add_varnish(const Hit& hit, const RaySurface& surface, const Vector3f& mirrored,
+                              PixelSampler& sampler, const VisibleLight* visible, const Path& path,
+                              FoundLight& light) const {
+  if (path.branched || surface.roughness >= kMirrorRoughness) {
+    (path.by_chance ? light.noisy : light.certain) +=
+        path.fraction.cwiseProduct(mirrored).cwiseProduct(mirrored_sky(hit, path));
+    return;
+  }
+  Path branch = path;
+  branch.branched = true;
+  branch.splits = 1;
+  branch.fraction = path.fraction.cwiseProduct(mirrored);
+  const float a = surface.roughness * surface.roughness;
+  branch.by_chance |= a >= kSharp;
+  const Vector3f facet =
+      a < kSharp ? hit.normal : visible_facet(hit.normal, -path.direction, a, sampler.next());
+  branch.turn(reflected(path.direction, facet), hit);
+  const FoundLight found = radiance(branch, sampler, visible);
+  light.noisy += found.noisy;
+  light.certain += found.certain;
 }
 
 // Returns the radiance that arrives along a path. `met`, if not null, is set to the distance of the first hit
@@ -325,7 +467,8 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
   bool sharp = path.cone < 0.1f;
   for (int step = 0; step < kMostSteps; ++step) {
     Hit hit;
-    const bool hits = scene_.first_hit(path.from, path.direction, kFar, hit);
+    const bool hits = path.is_picture ? scene_.first_seen(path.from, path.direction, kFar, hit)
+                                      : scene_.first_hit(path.from, path.direction, kFar, hit);
     if (path.particles != MetParticles::none) meet_particles(hits ? hit.distance : kFar, path, light);
     if (!hits && path.from_background && sharp && !path.mirrored) {
       light.background = path.fraction.mean();
@@ -336,7 +479,7 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
       return light;
     }
     if (step == 0 && met != nullptr) *met = hit.distance;
-    const int pixel = visible != nullptr && sharp ? visible->find(hit) : -1;
+    int pixel = visible != nullptr && sharp ? visible->find(hit) : -1;
     if (pixel >= 0 && visible->has_picture() && !path.mirrored) {
       add_source(visible->color(pixel));
       return light;
@@ -344,13 +487,16 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
     travelled += hit.distance;
     if (sources_.fog > 0) {
       const float clear = std::exp(-sources_.fog * hit.distance);
-      const Vector3f haze = sources_.sky.turned.picture ? horizon_color(sources_.sky, path.direction)
-                                                        : sky_seen(path.direction);
+      // In a picture, fog has the colour of the horizon in all directions, as in shaders/sky.glsl.
+      const bool horizon = path.is_picture || sources_.sky.turned.picture;
+      const Vector3f haze = horizon ? horizon_color(sources_.sky, path.direction) : sky_seen(path.direction);
       sum += path.fraction.cwiseProduct(haze) * (1 - clear);
       path.fraction *= clear;
     }
     const RayMaterial& material = *hit.material;
-    const Vector4f color = material.color(hit, travelled * path.cone);
+    const RaySurface surface = material.surface(hit, travelled * path.cone, sharp);
+    if (pixel < 0 && visible != nullptr && sharp && material.has_relief()) pixel = visible->find(hit);
+    const Vector4f& color = surface.color;
     path.by_chance |= color.w() > 0 && color.w() < 1;
     // The path passes through a hole or a translucent surface.
     if (color.w() < 1 && sampler.next().x >= color.w()) {
@@ -362,39 +508,53 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
       sum += path.fraction.cwiseProduct(albedo);
       return light;
     }
+    if (sharp && (material.clearcoat > 0 || material.sheen_color.maxCoeff() > 0))
+      add_layers(hit, path, light);
     // Glass only glows on its front, as in the shaders.
-    if ((hit.front || material.transmission <= 0) && !material.mean_emission().isZero())
+    const bool is_shaded = hit.front || material.transmission <= 0;
+    if (is_shaded && !material.mean_emission().isZero())
       (path.by_chance ? light.noisy : light.certain) +=
           path.fraction_of_glow(hit, sources_.glow) *
-          path.fraction.cwiseProduct(material.emission_at(hit.uv));
-    const bool in_mirror = sharp && path.mirrored;
-    if (in_mirror && (hit.front || material.transmission <= 0))
+          path.fraction.cwiseProduct(material.emission_at(hit.uvs));
+    if (sharp && is_shaded)
       (path.by_chance ? light.noisy : light.certain) +=
-          path.fraction.cwiseProduct(highlights(hit, albedo, path));
-    if (follow_glass(hit, albedo, sampler, path, light)) continue;
+          path.fraction.cwiseProduct(highlights(hit, surface.roughness, reflectance_of(surface)));
+    if (follow_glass(hit, surface, sampler, path, light)) continue;
     path.from = off_surface(hit.position, hit.face);
-    if (follow_smooth(hit, albedo, sampler, sharp, path.bounces > 0, path, light)) continue;
-    path.fraction = path.fraction.cwiseProduct(albedo);
-    const bool has_highlights_only = in_mirror && material.metallic > 0.5f;
-    if (pixel >= 0 && has_highlights_only) {
-      sum += path.fraction.cwiseProduct(visible->around(pixel));
-      return light;
-    }
+    if (follow_smooth(hit, surface, sampler, sharp, visible, path, light)) continue;
+    Response response = sharp ? Response::seen(hit, surface, path.direction, sources_.sky.sun_direction)
+                              : Response::scattered(albedo);
     if (pixel >= 0) {
-      const Vector4f arriving = visible->arriving(pixel);
-      const float cosine = hit.normal.dot(sources_.sky.sun_direction);
-      const float sun = sources_.sun.intensity * (std::max((1 - hit.translucency) * cosine, 0.0f) +
-                                                  std::max(-hit.translucency * cosine, 0.0f));
-      sum += path.fraction.cwiseProduct(arriving.head<3>() + sun * arriving.w() * sources_.sun.color);
+      const Vector4f& arriving = visible->arriving(pixel);
+      const float cosine = hit.normal.dot(sources_.sky.sun_direction), through = hit.translucency;
+      const Vector3f sun = sources_.sun.intensity * arriving.w() * sources_.sun.color;
+      const Vector3f from_front = response.around.cwiseProduct(arriving.head<3>()) +
+                                  response.lamps.cwiseProduct(visible->lamps(pixel)) +
+                                  std::max(cosine, 0.0f) * response.sun.cwiseProduct(sun);
+      const Vector3f from_behind =
+          surface.transmitted.cwiseProduct(arriving.head<3>() + std::max(-cosine, 0.0f) * sun);
+      sum += path.fraction.cwiseProduct((1 - through) * from_front + through * from_behind);
       return light;
     }
     if (hit.translucency > 0 && sampler.next().x < hit.translucency) {  // light from the other side
       hit.normal = -hit.normal;
       hit.face = -hit.face;
       path.from = off_surface(hit.position, hit.face);
+      response = Response::scattered(surface.transmitted);
     }
-    sum += path.fraction.cwiseProduct(has_highlights_only ? glow_at(path.from, hit.normal, hit.face, sampler)
-                                                          : direct_light(hit, path.from, sampler));
+    if (response.lamps.isZero() && response.sun.isZero()) {
+      sum += path.fraction.cwiseProduct(response.around)
+                 .cwiseProduct(glow_at(path.from, hit.normal, hit.face, sampler));
+    } else if (!sharp) {  // all fractions are equal
+      sum += path.fraction.cwiseProduct(response.around)
+                 .cwiseProduct(direct_light(hit, path.from, sampler).sum());
+    } else {
+      const DirectLight direct = direct_light(hit, path.from, sampler);
+      sum += path.fraction.cwiseProduct(response.sun.cwiseProduct(direct.sun) +
+                                        response.lamps.cwiseProduct(direct.lamps) +
+                                        response.around.cwiseProduct(direct.glow));
+    }
+    path.fraction = path.fraction.cwiseProduct(response.around);
     if (path.splits > 1) {
       split(hit, path, sampler, light);
       return light;

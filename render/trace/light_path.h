@@ -20,13 +20,13 @@ inline std::size_t index_of(int x, int y, int width) {
 /// Returns the fraction of the light along a ray that a glass surface reflects (Fresnel), in [0, 1].
 float mirrored_fraction(const Hit& hit, const Vector3f& direction);
 
-/// Returns whether the glass is so rough that refracted rays get a random direction.
-bool is_rough_glass(const RayMaterial& material);
+/// Returns whether glass is so rough that refracted rays get a random direction.
+bool is_rough_glass(float roughness);
 
 /// Moves a ray to the other side of a glass surface and refracts its direction. Returns the transmitted
 /// fraction of the light per channel: the colour `albedo` of a thin sheet. A solid piece applies the square
 /// root of its colour where the ray enters and where it leaves.
-Vector3f enter(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Vector3f& from,
+Vector3f enter(const Hit& hit, float roughness, const Vector3f& albedo, PixelSampler& sampler, Vector3f& from,
                Vector3f& direction);
 
 /// Returns the radiance that a white surface scatters from a sample of a glowing mesh, without shadows. It is
@@ -71,8 +71,11 @@ struct LightTracer::Path {
   float cone;                     ///< angle of the cone of directions that the ray represents [rad]
   Vector3f fraction = {1, 1, 1};  ///< throughput of the path per channel
   bool mirrored = false;          ///< whether mirrors have reflected the path so far
-  int bounces = 0;                ///< number of diffuse surfaces that radiance() has followed the path from
-  int splits = 1;                 ///< number of paths that leave the first diffuse surface
+  /// Whether the path shows a picture in a mirror or behind glass; false after a diffuse surface.
+  bool is_picture = false;
+  int bounces = 0;        ///< number of diffuse surfaces that radiance() has followed the path from
+  bool branched = false;  ///< whether the path is the mirror image of a varnished surface in a picture
+  int splits = 1;         ///< number of paths that leave the first diffuse surface
   MetParticles particles = MetParticles::none;  ///< particles that are visible along the path
   bool from_background =
       false;  ///< whether the path shows a transparent background if it leaves the scene unmirrored
@@ -93,6 +96,7 @@ struct LightTracer::Path {
     sampled_normal = normal;
     glow_is_sampled = true;
     particles = MetParticles::none;
+    is_picture = false;
     direction = outgoing;
     by_chance = true;
     density = -1;

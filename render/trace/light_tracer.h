@@ -90,11 +90,11 @@ class VisibleLight {
   bool has_picture() const { return !picture_.empty(); }
   Vector3f color(int pixel) const { return picture_[static_cast<std::size_t>(pixel)].head<3>(); }
   float opacity(int pixel) const { return picture_[static_cast<std::size_t>(pixel)].w(); }
-  /// Returns the light at the surface in a pixel from the sky, other surfaces and lamps; w: visible fraction
-  /// of the sun.
-  Vector4f arriving(int pixel) const;
-  /// The same without lamps and sun.
-  Vector3f around(int pixel) const { return light_.arriving[static_cast<std::size_t>(pixel)].head<3>(); }
+  /// Returns the light at the surface in a pixel from the sky and other surfaces; w: visible fraction of the
+  /// sun.
+  const Vector4f& arriving(int pixel) const { return light_.arriving[static_cast<std::size_t>(pixel)]; }
+  /// Returns the light of lamps at the surface in a pixel.
+  Vector3f lamps(int pixel) const;
 
  private:
   const LightBuffer& light_;
@@ -140,14 +140,26 @@ class LightTracer {
   FoundLight radiance(Path path, PixelSampler& sampler, const VisibleLight* visible = nullptr,
                       float* met = nullptr) const;
   void split(const Hit& hit, const Path& path, PixelSampler& sampler, FoundLight& light) const;
-  bool follow_glass(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Path& path,
+  bool follow_glass(const Hit& hit, const RaySurface& surface, PixelSampler& sampler, Path& path,
                     FoundLight& found) const;
-  bool follow_smooth(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, bool sharp,
-                     bool scattered, Path& path, FoundLight& light) const;
+  bool follow_smooth(const Hit& hit, const RaySurface& surface, PixelSampler& sampler, bool sharp,
+                     const VisibleLight* visible, Path& path, FoundLight& light) const;
+  void add_varnish(const Hit& hit, const RaySurface& surface, const Vector3f& mirrored, PixelSampler& sampler,
+                   const VisibleLight* visible, const Path& path, FoundLight& light) const;
+  Vector3f mirrored_sky(const Hit& hit, const Path& path) const;
+  void add_layers(const Hit& hit, Path& path, FoundLight& light) const;
   void prepare_particles(MetParticles groups, const SampleOffsets& offsets) const;
   void meet_particles(float length, Path& path, FoundLight& found) const;
-  Vector3f highlights(const Hit& hit, const Vector3f& albedo, const Path& path) const;
-  Vector3f direct_light(const Hit& hit, const Vector3f& from, PixelSampler& sampler) const;
+  Vector3f highlight(const Hit& hit, const LampPoint<float>& point, bool shadows, float roughness,
+                     const Vector3f& reflectance) const;
+  Vector3f highlight_of_sun(const Hit& hit, float roughness, const Vector3f& reflectance) const;
+  Vector3f highlights(const Hit& hit, float roughness, const Vector3f& reflectance) const;
+  /// Light of sources on a white surface.
+  struct DirectLight {
+    Vector3f sun = Vector3f::Zero(), lamps = Vector3f::Zero(), glow = Vector3f::Zero();
+    Vector3f sum() const { return sun + lamps + glow; }
+  };
+  DirectLight direct_light(const Hit& hit, const Vector3f& from, PixelSampler& sampler) const;
   Vector3f glow_at(const Vector3f& place, const Vector3f& normal, const Vector3f& face,
                    PixelSampler& sampler) const;
   LaneVectors trace_glow(const Points& points, int x, int y, const LightView& view) const;
@@ -156,7 +168,7 @@ class LightTracer {
   float sun_visibility(const Vector3f& place, const SquarePoint<float>& uv) const;
   Lanes sun_visibility(const LaneVectors& place, IntLanes active, const SquarePoint<Lanes>& uv,
                        RayScene::Focus focus) const;
-  FoundLight light_through(const Point& point, const Vector3f& eye, PixelSampler& sampler,
+  FoundLight light_through(const Point& point, const LightView& view, PixelSampler& sampler,
                            const VisibleLight& visible, bool from_background) const;
   Vector3f mirrored_light(const Point& point, const LightView& view, PixelSampler& sampler,
                           const VisibleLight& visible, LightSums& sums, int rays, int splits) const;

@@ -63,6 +63,7 @@ Vector3f LightTracer::mirrored_along(const Point& point, const Vector3f& facet, 
       .direction = outgoing,
       .cone = std::max(a, view.pixel_m),
       .mirrored = true,
+      .is_picture = true,
       .splits = splits,
       .particles = sources_.particles == nullptr ? MetParticles::none : particles_in_mirror(point.roughness),
       .by_chance = a >= kSharp,
@@ -115,19 +116,23 @@ void LightTracer::trace_mirrors(const SurfaceBuffer& surfaces, const LightView& 
 // Returns the light that arrives at the eye through a glass surface. The path starts just before the surface,
 // at a distance of few significant bits from the eye: inside glass, paths are so sensitive to rounding errors
 // that pictures would otherwise depend on the driver that drew the surface.
-LightTracer::FoundLight LightTracer::light_through(const Point& point, const Vector3f& eye,
+LightTracer::FoundLight LightTracer::light_through(const Point& point, const LightView& view,
                                                    PixelSampler& sampler, const VisibleLight& visible,
                                                    bool from_background) const {
-  const float before = (1 - 0x1p-12f) * point.view.dot(eye - point.place);
+  const float before = (1 - 0x1p-12f) * point.view.dot(view.eye - point.place);
   const float distance = std::bit_cast<float>(std::bit_cast<uint32_t>(before) & ~0x1fffu);
-  Path path{.from = eye - distance * point.view, .direction = -point.view, .cone = 1e-3f};
+  Path path{.from = view.eye - distance * point.view,
+            .direction = -point.view,
+            .cone = view.pixel_m,
+            .is_picture = true};
   path.from_background = from_background;
   Hit hit;
-  if (!scene_.first_hit(path.from, path.direction, kFar, hit)) return radiance(path, sampler, &visible);
-  const Vector3f albedo = hit.material->color(hit, 0).head<3>();
+  if (!scene_.first_seen(path.from, path.direction, kFar, hit)) return radiance(path, sampler, &visible);
+  const RaySurface surface = hit.material->surface(hit, (hit.position - view.eye).norm() * path.cone, true);
   path.fraction *= 1 - mirrored_fraction(hit, path.direction);
-  path.by_chance = is_rough_glass(*hit.material);
-  path.fraction = path.fraction.cwiseProduct(enter(hit, albedo, sampler, path.from, path.direction));
+  path.by_chance = is_rough_glass(surface.roughness);
+  path.fraction = path.fraction.cwiseProduct(
+      enter(hit, surface.roughness, surface.color.head<3>(), sampler, path.from, path.direction));
   return radiance(path, sampler, &visible);
 }
 
@@ -166,7 +171,7 @@ void LightTracer::trace_glass(const SurfaceBuffer& surfaces, int x0, int y0, con
         const Vector3f mirrored = mirrored_light(point, view, sampler, behind, sums, 1, 1);
         const bool from_background =
             !sources_.sky_is_visible && behind.opacity(behind.pixel(x0 + x + i, y0 + y)) == 0;
-        const FoundLight through = light_through(point, view.eye, sampler, behind, from_background);
+        const FoundLight through = light_through(point, view, sampler, behind, from_background);
         glass.mirrored[pixel] << mirrored, through.background;
         glass.through[pixel] << through.limited(sums), sunny ? sun_visibility(point.place, on_sun) : 0.0f;
       }

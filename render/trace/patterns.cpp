@@ -112,67 +112,70 @@ struct Water : Inputs {
 }  // namespace glsl
 
 template <class Shader>
-Vector3f color_by(const glsl::Inputs& inputs, const Vector3f& position, const Vector3f& normal) {
+PatternPoint point_by(const glsl::Inputs& inputs, const Vector3f& position, const Vector3f& normal) {
   Shader shader;
   static_cast<glsl::Inputs&>(shader) = inputs;
   const auto sample = shader.pattern_sample(glsl::vec3(position.x(), position.y(), position.z()),
                                             glsl::vec3(normal.x(), normal.y(), normal.z()));
-  return {sample.color.x, sample.color.y, sample.color.z};
+  return {{sample.color.x, sample.color.y, sample.color.z},
+          sample.roughness,
+          {sample.slope.x, sample.slope.y, sample.slope.z}};
 }
 
 }  // namespace
 
-Vector3f pattern_color(Pattern pattern, const Vector3f& position, const Vector3f& normal, float footprint,
-                       const Vector3f& color, const Vector3f& second_color, float scale) {
+PatternPoint pattern_point(const PatternDef& def, const Vector3f& position, const Vector3f& normal,
+                           float footprint, float time) {
+  const Vector3f &color = def.color, &second = def.second_color;
   const glsl::Inputs inputs{
-      {glsl::vec4(0)},
+      {glsl::vec4(time, 0, 0, 0)},
       {glsl::vec4(color.x(), color.y(), color.z(), 1),
-       glsl::vec4(second_color.x(), second_color.y(), second_color.z(), scale), glsl::vec4(0, 0.5f, 0, 0)},
+       glsl::vec4(second.x(), second.y(), second.z(), def.scale), glsl::vec4(0, def.roughness, 0, 0)},
       footprint};
-  switch (pattern) {
+  switch (def.pattern) {
     case Pattern::none:
-      return color;
+      return {.color = color};
     case Pattern::checker:
       static_assert(static_cast<int>(Pattern::checker) == 1);
-      return color_by<glsl::Checker>(inputs, position, normal);
+      return point_by<glsl::Checker>(inputs, position, normal);
     case Pattern::grid:
       static_assert(static_cast<int>(Pattern::grid) == 2);
-      return color_by<glsl::Grid>(inputs, position, normal);
+      return point_by<glsl::Grid>(inputs, position, normal);
     case Pattern::noise:
       static_assert(static_cast<int>(Pattern::noise) == 3);
-      return color_by<glsl::Noise>(inputs, position, normal);
+      return point_by<glsl::Noise>(inputs, position, normal);
     case Pattern::brick:
       static_assert(static_cast<int>(Pattern::brick) == 4);
-      return color_by<glsl::Brick>(inputs, position, normal);
+      return point_by<glsl::Brick>(inputs, position, normal);
     case Pattern::wood:
       static_assert(static_cast<int>(Pattern::wood) == 5);
-      return color_by<glsl::Wood>(inputs, position, normal);
+      return point_by<glsl::Wood>(inputs, position, normal);
     case Pattern::lawn:
       static_assert(static_cast<int>(Pattern::lawn) == 6);
-      return color_by<glsl::Lawn>(inputs, position, normal);
+      return point_by<glsl::Lawn>(inputs, position, normal);
     case Pattern::paving:
       static_assert(static_cast<int>(Pattern::paving) == 7);
-      return color_by<glsl::Paving>(inputs, position, normal);
+      return point_by<glsl::Paving>(inputs, position, normal);
     case Pattern::stripes:
       static_assert(static_cast<int>(Pattern::stripes) == 8);
-      return color_by<glsl::Stripes>(inputs, position, normal);
+      return point_by<glsl::Stripes>(inputs, position, normal);
     case Pattern::gingham:
       static_assert(static_cast<int>(Pattern::gingham) == 9);
-      return color_by<glsl::Gingham>(inputs, position, normal);
+      return point_by<glsl::Gingham>(inputs, position, normal);
     case Pattern::concrete:
       static_assert(static_cast<int>(Pattern::concrete) == 10);
-      return color_by<glsl::Concrete>(inputs, position, normal);
+      return point_by<glsl::Concrete>(inputs, position, normal);
     case Pattern::sand:
       static_assert(static_cast<int>(Pattern::sand) == 11);
-      return color_by<glsl::Sand>(inputs, position, normal);
+      return point_by<glsl::Sand>(inputs, position, normal);
     case Pattern::planks:
       static_assert(static_cast<int>(Pattern::planks) == 12);
-      return color_by<glsl::Planks>(inputs, position, normal);
+      return point_by<glsl::Planks>(inputs, position, normal);
     case Pattern::water:
       static_assert(static_cast<int>(Pattern::water) == 13);
-      return color_by<glsl::Water>(inputs, position, normal);
+      return point_by<glsl::Water>(inputs, position, normal);
   }
-  return color;
+  return {.color = color};
 }
 
 }  // namespace offstage::render

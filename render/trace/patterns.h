@@ -5,9 +5,23 @@
 
 namespace offstage::render {
 
-/// Returns the colour of a pattern at a point in object space. `footprint`: width of the area that is
-/// averaged, in the object's units. Water is drawn as at the time 0.
-Vector3f pattern_color(Pattern pattern, const Vector3f& position, const Vector3f& normal, float footprint,
-                       const Vector3f& color, const Vector3f& second_color, float scale);
+/// A pattern at a point, as PatternSample in shaders/pattern.glsl.
+struct PatternPoint {
+  Vector3f color = Vector3f::Zero();
+  float roughness = 1;                ///< factor
+  Vector3f slope = Vector3f::Zero();  ///< gradient of the surface's height, along the object's axes
+};
+
+/// The values on which a pattern depends. `roughness`: of the material.
+struct PatternDef {
+  Pattern pattern = Pattern::none;
+  Vector3f color = Vector3f::Zero(), second_color = Vector3f::Zero();
+  float scale = 1, roughness = 0.5f;  ///< `scale`: size of one cell [m]
+};
+
+/// Returns a pattern at a point in object space. `footprint`: width of the area that is averaged, in the
+/// object's units. `time`: of the ripples of water [s].
+PatternPoint pattern_point(const PatternDef& def, const Vector3f& position, const Vector3f& normal,
+                           float footprint, float time);
 
 }  // namespace offstage::render

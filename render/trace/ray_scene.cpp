@@ -25,6 +25,7 @@ constexpr unsigned blocking(RayScene::Focus focus) {
 // Largest number of translucent surfaces and sprites that a shadow ray is tested against; light passes the
 // others freely.
 constexpr int kMostPassed = 64;
+constexpr int kMostHidden = 64;  // largest number of hidden backs that a ray of a picture passes
 
 RTCGeometry make_triangles(const void* positions, std::size_t stride, std::size_t count,
                            std::span<const uint32_t> indices) {
@@ -68,7 +69,12 @@ std::string ray_library() {
 }
 
 RayMesh::RayMesh(const Mesh& mesh, const std::vector<Vector3f>& mesh_normals)
-    : normals(mesh_normals), uvs(mesh.uvs), colors(mesh.colors), indices(mesh.indices) {
+    : normals(mesh_normals),
+      uvs(mesh.uvs),
+      second_uvs(mesh.second_uvs),
+      tangents(mesh.tangents),
+      colors(mesh.colors),
+      indices(mesh.indices) {
   positions.reserve(mesh.positions.size());
   for (const Vector3f& p : mesh.positions) positions.push_back({p.x(), p.y(), p.z(), 0});
 }
@@ -90,10 +96,42 @@ std::array<Vector3f, 3> RayMesh::corners(unsigned triangle, const Eigen::Affine3
   return result;
 }
 
-Vector2f RayMesh::uv_at(unsigned triangle, const Vector2f& barycentric) const {
-  if (uvs.empty()) return {0, 0};
+std::array<Vector2f, 2> RayMesh::uvs_at(unsigned triangle, const Vector2f& barycentric) const {
   const uint32_t* k = &indices[3 * std::size_t{triangle}];
-  return mixed(uvs[k[0]], uvs[k[1]], uvs[k[2]], barycentric);
+  const auto at = [&](const std::vector<Vector2f>& set) -> Vector2f {
+    if (set.empty()) return {0, 0};
+    return mixed(set[k[0]], set[k[1]], set[k[2]], barycentric);
+  };
+  return {at(uvs), at(second_uvs)};
+}
+
+const Vector2f& RayMesh::uv_of(std::size_t vertex, int set) const {
+  static const Vector2f none(0, 0);
+  const std::vector<Vector2f>& of_set = set == 1 ? second_uvs : uvs;
+  return of_set.empty() ? none : of_set[vertex];
+}
+
+bool RayMesh::is_plate() const {
+  constexpr double kLeastFraction = 0.9;  // of the area
+  constexpr double kParallel = 0.999;     // least cosine between two normals
+  if (is_plate_) return *is_plate_;
+  Eigen::Vector3d axis = Eigen::Vector3d::Zero();  // area of the largest triangle
+  double all = 0, parallel = 0;
+  const auto area_of = [this](unsigned triangle) -> Eigen::Vector3d {
+    const std::array<Vector3f, 3> p = corners(triangle, Eigen::Affine3f::Identity());
+    return (p[1] - p[0]).cross(p[2] - p[0]).cast<double>();
+  };
+  const auto count = static_cast<unsigned>(indices.size() / 3);
+  for (unsigned t = 0; t < count; ++t)
+    if (const Eigen::Vector3d area = area_of(t); area.squaredNorm() > axis.squaredNorm()) axis = area;
+  axis.normalize();
+  for (unsigned t = 0; t < count; ++t) {
+    const Eigen::Vector3d area = area_of(t);
+    all += area.norm();
+    if (std::abs(area.dot(axis)) > kParallel * area.norm()) parallel += area.norm();
+  }
+  is_plate_ = parallel >= kLeastFraction * all;
+  return *is_plate_;
 }
 
 const std::vector<float>& RayMesh::areas() const {
@@ -147,6 +185,8 @@ struct RayScene::Object {
 
  private:
   void describe_mesh(unsigned triangle, const Vector3f& from, const Vector3f& direction, Hit& hit) const;
+  void describe_tangents(const TextureMap& map, unsigned triangle, const std::array<Vector3f, 3>& corners,
+                         const Vector2f& barycentric, Hit& hit) const;
   void describe_cloth(unsigned triangle, const Vector3f& from, const Vector3f& direction, Hit& hit) const;
   void describe_ball(unsigned ball, const Vector3f& from, const Vector3f& direction, Hit& hit) const;
 };
@@ -154,7 +194,8 @@ struct RayScene::Object {
 RayScene::RayScene() = default;
 RayScene::~RayScene() = default;
 
-void RayScene::clear() {
+void RayScene::clear(float time) {
+  time_ = time;
   objects_.clear();
   cloth_trees_.clear();
   tree_ = embree::make_tree(RTC_BUILD_QUALITY_LOW);
@@ -242,10 +283,9 @@ void RayScene::Object::describe(unsigned triangle, const Vector3f& from, const V
   hit.distance = direction.dot(hit.position - from);
   hit.front = hit.face.dot(direction) <= 0;
   if (!hit.front) hit.face = -hit.face;
-  // Smooth normals can turn away from the ray at outlines.
   if (hit.normal.dot(hit.face) < 0) hit.normal = -hit.normal;
-  const float towards = -hit.normal.dot(direction);
-  if (towards < 0.02f) hit.normal = (hit.normal - (0.02f - towards) * direction).normalized();
+  hit.turn_normal_to(-direction);
+  hit.direction = direction;
 }
 
 void RayScene::Object::describe_mesh(unsigned triangle, const Vector3f& from, const Vector3f& direction,
@@ -262,9 +302,45 @@ void RayScene::Object::describe_mesh(unsigned triangle, const Vector3f& from, co
   hit.object_normal = mixed(mesh->normals[k[0]], mesh->normals[k[1]], mesh->normals[k[2]], uv);
   hit.normal = (normal_from_mesh * hit.object_normal).normalized();
   if (!hit.normal.allFinite()) hit.normal = hit.face;
-  if (!mesh->uvs.empty()) hit.uv = mixed(mesh->uvs[k[0]], mesh->uvs[k[1]], mesh->uvs[k[2]], uv);
+  hit.world_from_object = &world_from_mesh;
+  hit.uvs = mesh->uvs_at(triangle, uv);
+  if (const TextureMap* map = material->normal_map()) describe_tangents(*map, triangle, p, uv, hit);
   if (!mesh->colors.empty() && material->vertex_colors)
     hit.color = mixed(mesh->colors[k[0]], mesh->colors[k[1]], mesh->colors[k[2]], uv);
+}
+
+// Computes the directions of a normal map in the same way as mapped_normal() in shaders/mesh.frag. Without
+// given tangents, they are the gradients of the texture coordinates on the surface.
+void RayScene::Object::describe_tangents(const TextureMap& map, unsigned triangle,
+                                         const std::array<Vector3f, 3>& corners, const Vector2f& barycentric,
+                                         Hit& hit) const {
+  std::array<std::size_t, 3> k;
+  for (std::size_t i = 0; i < 3; ++i) k[i] = mesh->indices[3 * std::size_t{triangle} + i];
+  const Vector3f n = hit.normal;
+  if (!mesh->tangents.empty()) {
+    const std::vector<Vector4f>& all = mesh->tangents;
+    const Vector4f tangent = mixed(all[k[0]], all[k[1]], all[k[2]], barycentric);
+    const Vector3f t = world_from_mesh.linear() * tangent.head<3>();
+    if (t.squaredNorm() > 1e-6f) {
+      hit.along_u = (t - n * n.dot(t)).normalized();
+      hit.against_v = ((tangent.w() < 0) != mirrored ? -1.0f : 1.0f) * n.cross(hit.along_u);
+      return;
+    }
+  }
+  const Vector3f ab = corners[1] - corners[0], ac = corners[2] - corners[0];
+  const auto place = [&](std::size_t i) -> Vector2f {
+    const Vector3f uv = mesh->uv_of(k[i], map.uv_set).homogeneous();
+    return {map.rows[0].dot(uv), map.rows[1].dot(uv)};
+  };
+  const Vector2f along_ab = place(1) - place(0), along_ac = place(2) - place(0);
+  const float side = n.dot(ab.cross(ac)) < 0 ? -1.0f : 1.0f;
+  const Vector3f a = side * ac.cross(n), b = side * n.cross(ab);
+  hit.along_u = a * along_ab.x() + b * along_ac.x();
+  hit.against_v = -(a * along_ab.y() + b * along_ac.y());
+  const float size =
+      1 / std::sqrt(std::max({hit.along_u.squaredNorm(), hit.against_v.squaredNorm(), 1e-30f}));
+  hit.along_u *= size;
+  hit.against_v *= size;
 }
 
 // The result is the mean of three projections of the point, onto the planes through the corners that are
@@ -298,11 +374,12 @@ void RayScene::Object::describe_cloth(unsigned triangle, const Vector3f& from, c
   hit.face = (b.position - a.position).cross(c.position - a.position).normalized();
   hit.normal = mixed(a.normal, b.normal, c.normal, uv).normalized();
   if (!hit.normal.allFinite()) hit.normal = hit.face;
+  hit.is_cloth = true;
   hit.translucency = material->translucency;
   const Vector2f along = mixed(a.uv, b.uv, c.uv, uv);
   hit.object_position = {along.x(), along.y(), 0};
   hit.object_normal = Vector3f::UnitZ();
-  hit.uv = along.cwiseProduct(texture_from_uv);
+  hit.uvs[0] = along.cwiseProduct(texture_from_uv);
 }
 
 void RayScene::Object::describe_ball(unsigned ball, const Vector3f& from, const Vector3f& direction,
@@ -349,7 +426,21 @@ bool RayScene::first_hit(const Vector3f& from, const Vector3f& direction, float 
   hit = {};
   hit.object = static_cast<unsigned>(object - objects_.data());
   hit.triangle = ray.hit.primID;
+  hit.time = time_;
   object->describe(ray.hit.primID, from, direction, hit);
+  return true;
+}
+
+bool RayScene::first_seen(const Vector3f& from, const Vector3f& direction, float length, Hit& hit) const {
+  Vector3f place = from;
+  for (int layer = 0; layer <= kMostHidden; ++layer) {
+    if (!first_hit(place, direction, length, hit)) return false;
+    const bool is_mesh = hit.world_from_object != nullptr;
+    if (hit.front || !is_mesh || !hit.material->hides_back) break;
+    length -= hit.distance;
+    place = off_surface(hit.position, -hit.face);
+  }
+  hit.distance = direction.dot(hit.position - from);
   return true;
 }
 

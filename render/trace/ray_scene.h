@@ -3,9 +3,11 @@
 /// hierarchies by Embree. Embree only finds the object and the triangle. The hit point is computed here, so
 /// that its bits do not depend on Embree's version.
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -30,9 +32,14 @@ class RayMesh {
   RTCSceneTy* tree() const;
   /// Returns the corners of a triangle in the world.
   std::array<Vector3f, 3> corners(unsigned triangle, const Eigen::Affine3f& world_from_mesh) const;
-  /// Returns the texture coordinates at a point of a triangle. `barycentric`: weights of its second and third
-  /// corner.
-  Vector2f uv_at(unsigned triangle, const Vector2f& barycentric) const;
+  /// Returns both sets of texture coordinates at a point of a triangle. `barycentric`: weights of its second
+  /// and third corner.
+  std::array<Vector2f, 2> uvs_at(unsigned triangle, const Vector2f& barycentric) const;
+  /// Returns the texture coordinates of a vertex.
+  const Vector2f& uv_of(std::size_t vertex, int set) const;
+  /// Returns whether nearly the whole surface consists of parallel planes, as that of a pane. Light does not
+  /// change its direction on its way through a plate of glass.
+  bool is_plate() const;
   /// Returns the area of all triangles, in square units of the mesh.
   float area() const;
   /// Chooses a triangle with a probability in proportion to its area. `choice`: random number in [0, 1).
@@ -42,14 +49,16 @@ class RayMesh {
 
   std::vector<Vector4f> positions;  ///< w is not used; Embree reads 16 bytes
   std::vector<Vector3f> normals;
-  std::vector<Vector2f> uvs;     ///< texture coordinates of the vertices; empty: none
-  std::vector<Vector4f> colors;  ///< colours of the vertices; empty: none
+  std::vector<Vector2f> uvs, second_uvs;  ///< texture coordinates of the vertices; empty: none
+  std::vector<Vector4f> tangents;         ///< see Mesh::tangents
+  std::vector<Vector4f> colors;           ///< colours of the vertices; empty: none
   std::vector<uint32_t> indices;
 
  private:
   const std::vector<float>& areas() const;
   mutable RayTree tree_;
   mutable std::vector<float> area_up_to_;  ///< sum of the areas up to each triangle; computed on first use
+  mutable std::optional<bool> is_plate_;   ///< computed on first use
 };
 
 /// The first hit of a ray.
@@ -60,13 +69,25 @@ struct Hit {
   Vector3f face = Vector3f::Zero();    ///< unit normal of the triangle, on the side of the ray's origin
   bool front = true;                   ///< whether the ray hits the front of the surface
   const RayMaterial* material = nullptr;
+  bool is_cloth = false;
   float translucency = 0;  ///< translucency of a cloth; 0 for other objects
+  float time = 0;          ///< time of animated surfaces [s]
   /// Number of the object in the RayScene, and of the triangle in its mesh.
   unsigned object = 0, triangle = 0;
   Vector3f object_position = Vector3f::Zero();  ///< position in the object's frame, for patterns
   Vector3f object_normal = Vector3f::Zero();
-  Vector2f uv = {0, 0};
-  Vector4f color = {1, 1, 1, 1};  ///< interpolated colour of the vertices
+  const Eigen::Affine3f* world_from_object = nullptr;              ///< null for cloths and balls
+  std::array<Vector2f, 2> uvs = {Vector2f(0, 0), Vector2f(0, 0)};  ///< both sets of texture coordinates
+  Vector4f color = {1, 1, 1, 1};                                   ///< interpolated colour of the vertices
+  Vector3f direction = Vector3f::Zero();                           ///< unit direction of the ray
+  /// Directions of X and Y of a normal map, if the material has one; zero without texture coordinates.
+  Vector3f along_u = Vector3f::Zero(), against_v = Vector3f::Zero();
+
+  /// Tilts the normal if it faces away from a direction. Smooth normals and relief can do so at outlines.
+  void turn_normal_to(const Vector3f& view) {
+    const float towards = normal.dot(view);
+    if (towards < 0.02f) normal = (normal + (0.02f - towards) * view).normalized();
+  }
 };
 
 class RayScene {
@@ -76,8 +97,8 @@ class RayScene {
   RayScene(const RayScene&) = delete;
   RayScene& operator=(const RayScene&) = delete;
 
-  /// Removes all objects.
-  void clear();
+  /// Removes all objects. `time`: of animated surfaces such as ripples [s].
+  void clear(float time = 0);
   /// Adds a mesh and returns the object's number. `mesh` and `material` must stay in memory until clear().
   /// `focuses`: whether the object is glass that focuses light; see Focus.
   unsigned add(const RayMesh& mesh, const RayMaterial& material, const Eigen::Affine3f& world_from_mesh,
@@ -112,6 +133,9 @@ class RayScene {
                             IntLanes active, Focus focus = Focus::passes) const;
   /// Finds the first hit of a ray. Returns false if the ray hits nothing within `length` [m].
   bool first_hit(const Vector3f& from, const Vector3f& direction, float length, Hit& hit) const;
+  /// Finds the first hit of a ray that belongs to a picture: the ray passes through the backs that the
+  /// shaders do not draw; see RayMaterial::hides_back.
+  bool first_seen(const Vector3f& from, const Vector3f& direction, float length, Hit& hit) const;
   /// Moves the point `place` of a mesh, which is visible from `eye`, onto the curved surface that the smooth
   /// normals of its triangle describe (J. Hanika, "Hacking the Shadow Terminator", 2021). Returns points of
   /// other objects unchanged.
@@ -127,6 +151,7 @@ class RayScene {
   std::vector<RayTree> cloth_trees_;
   RayTree tree_;
   bool has_translucent_ = false;
+  float time_ = 0;
 };
 
 // Distances by which off_surface() moves a point, relative to its largest coordinate and at least. The error

@@ -11,8 +11,6 @@
 namespace offstage::render {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 struct Named {
   const char* name;
   Mesh mesh;
@@ -24,15 +22,28 @@ std::vector<Named> closed_primitives() {
   // The bevelled box is the Minkowski sum of a box of 0.8 x 1.8 x 2.8 with a ball of radius 0.1 (Steiner's
   // formula).
   const double a = 0.8, b = 1.8, c = 2.8, r = 0.1;
-  const double box_area = 2 * (a * b + b * c + c * a) + 2 * kPi * r * (a + b + c) + 4 * kPi * r * r;
-  const double box_volume =
-      a * b * c + 2 * r * (a * b + b * c + c * a) + kPi * r * r * (a + b + c) + 4 * kPi / 3 * r * r * r;
-  return {{"sphere", make_sphere(2, 96), 16 * kPi, 32 * kPi / 3, {4, 4, 4}},
+  const double box_area =
+      2 * (a * b + b * c + c * a) + 2 * std::numbers::pi * r * (a + b + c) + 4 * std::numbers::pi * r * r;
+  const double box_volume = a * b * c + 2 * r * (a * b + b * c + c * a) +
+                            std::numbers::pi * r * r * (a + b + c) + 4 * std::numbers::pi / 3 * r * r * r;
+  return {{"sphere", make_sphere(2, 96), 16 * std::numbers::pi, 32 * std::numbers::pi / 3, {4, 4, 4}},
           {"box", make_box({1, 2, 3}), 22, 6, {1, 2, 3}},
           {"bevelled box", make_box({1, 2, 3}, 0.1f), box_area, box_volume, {1, 2, 3}},
-          {"capsule", make_capsule(0.5f, 2, 96), 2 * kPi + kPi, 0.5 * kPi + kPi / 6, {1, 3, 1}},
-          {"cylinder", make_cylinder(0.5f, 2, 96), 2 * kPi + 0.5 * kPi, 0.5 * kPi, {1, 2, 1}},
-          {"cone", make_cone(0.5f, 2, 96), kPi * 0.25 + kPi * 0.5 * std::sqrt(4.25), kPi / 6, {1, 2, 1}}};
+          {"capsule",
+           make_capsule(0.5f, 2, 96),
+           2 * std::numbers::pi + std::numbers::pi,
+           0.5 * std::numbers::pi + std::numbers::pi / 6,
+           {1, 3, 1}},
+          {"cylinder",
+           make_cylinder(0.5f, 2, 96),
+           2 * std::numbers::pi + 0.5 * std::numbers::pi,
+           0.5 * std::numbers::pi,
+           {1, 2, 1}},
+          {"cone",
+           make_cone(0.5f, 2, 96),
+           std::numbers::pi * 0.25 + std::numbers::pi * 0.5 * std::sqrt(4.25),
+           std::numbers::pi / 6,
+           {1, 2, 1}}};
 }
 
 std::array<float, 3> key(const Vector3f& p) {

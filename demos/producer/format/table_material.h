@@ -59,7 +59,8 @@ struct Table<Material> {
          "angle by which the texture is turned counter-clockwise: about its centre or, with `triplanar`, "
          "about the axes of the body",
          "degrees"},
-        {"two_sided", &T::two_sided, "whether back faces are lit and drawn as well"},
+        {"two_sided", &T::two_sided,
+         "whether back faces are lit and drawn as well, also in mirrors; shadows do not depend on it"},
         {"fabric", &T::fabric,
          "appearance of the threads, if the material is used for a cloth; default: the appearance of the "
          "cloth's fabric"},
