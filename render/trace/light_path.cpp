@@ -31,7 +31,7 @@ float fresnel_of_glass(float cosine, float ratio) {
 
 /// Returns the reflectance in all directions, as sky_reflectance() in shaders/light.glsl. `f0`: reflectance
 /// at perpendicular incidence; `nv`: cosine between the normal and the direction to the eye.
-Vector3f reflectance_of(const Vector3f& f0, float roughness, float nv) {
+Vector3f sky_reflectance(const Vector3f& f0, float roughness, float nv) {
   const Vector4f r =
       roughness * Vector4f(-1, -0.0275f, -0.572f, 0.022f) + Vector4f(1, 0.0425f, 1.04f, -0.04f);
   const float t = std::min(r.x() * r.x(), std::exp2(-9.28f * nv)) * r.x() + r.y();
@@ -53,7 +53,7 @@ float mean_over_disc(float a2, float u, float disc) {
 }
 
 /// Returns the reflectance of a surface at perpendicular incidence.
-Vector3f reflectance_of(const RaySurface& surface) {
+Vector3f reflectance_at_right_angle(const RaySurface& surface) {
   return surface.reflectance + surface.metallic * (surface.color.head<3>() - surface.reflectance);
 }
 
@@ -92,8 +92,8 @@ struct Response {
   /// in fabric.glsl. Rough surfaces mirror the light from all around.
   static Response seen(const Hit& hit, const RaySurface& surface, const Vector3f& direction,
                        const Vector3f& to_sun) {
-    const Vector3f f0 = reflectance_of(surface), one = Vector3f::Ones();
-    const float nv = facing_cosine(hit, direction), from_sky = sheen_in_sky(nv);
+    const Vector3f f0 = reflectance_at_right_angle(surface), one = Vector3f::Ones();
+    const float nv = facing_cosine(hit, direction), from_sky = sheen_in_sky(nv_of_sheen);
     const Vector3f mirrored = reflectance_of(f0, surface.roughness, nv);
     const Vector3f h = (to_sun - direction).normalized();
     Vector3f diffuse = (1 - surface.metallic) * surface.color.head<3>(), sheen;
@@ -393,17 +393,20 @@ Vector3f LightTracer::mirrored_sky(const Hit& hit, const Path& path) const {
 // reduces the fraction of the path to that which the layers leave to the surface below.
 void LightTracer::add_layers(const Hit& hit, Path& path, FoundLight& light) const {
   const RayMaterial& material = *hit.material;
-  const float nv = facing_cosine(hit, path.direction);
+  const float nv_of_sheen = facing_cosine(hit, path.direction);
   if (const float coat = material.clearcoat; coat > 0) {
+    Hit over = hit;
+    over.normal = hit.smooth_normal;
+    const float nv = facing_cosine(over, path.direction);
     const float roughness = material.clearcoat_roughness;
     const Vector3f f0 = Vector3f::Constant(0.04f);
     (path.by_chance ? light.noisy : light.certain) +=
         coat *
-        path.fraction.cwiseProduct(highlight_of_sun(hit, roughness, f0) +
-                                   reflectance_of(f0, roughness, nv).cwiseProduct(mirrored_sky(hit, path)));
+        path.fraction.cwiseProduct(highlight_of_sun(over, roughness, f0) +
+                                   sky_reflectance(f0, roughness, nv).cwiseProduct(mirrored_sky(over, path)));
     path.fraction *= 1 - coat * fresnel_at(f0, nv).x();
   }
-  path.fraction *= 1 - material.sheen_color.maxCoeff() * sheen_in_sky(nv);
+  path.fraction *= 1 - material.sheen_color.maxCoeff() * sheen_in_sky(nv_of_sheen);
 }
 
 // Reflects a path at a smooth metal and returns true. At other smooth surfaces it adds the light that
@@ -412,9 +415,10 @@ bool LightTracer::follow_smooth(const Hit& hit, const RaySurface& surface, Pixel
                                 const VisibleLight* visible, Path& path, FoundLight& light) const {
   if (surface.roughness >= kSmoothMetal) return false;
   const float nv = facing_cosine(hit, path.direction);
-  const Vector3f mirrored = mirrored_fraction_of(surface.occlusion, surface.roughness, nv) *
-                            (sharp ? reflectance_of(reflectance_of(surface), surface.roughness, nv)
-                                   : fresnel_at(surface.color.head<3>(), -hit.normal.dot(path.direction)));
+  const Vector3f mirrored =
+      mirrored_fraction_of(surface.occlusion, surface.roughness, nv) *
+      (sharp ? sky_reflectance(reflectance_at_right_angle(surface), surface.roughness, nv)
+             : fresnel_at(surface.color.head<3>(), -hit.normal.dot(path.direction)));
   if (surface.metallic > 0.5f) {
     const float a = std::max(surface.roughness * surface.roughness, path.bounces > 0 ? 0.04f : 1e-4f);
     path.by_chance |= a >= kSharp;
@@ -508,17 +512,17 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
       sum += path.fraction.cwiseProduct(albedo);
       return light;
     }
-    if (sharp && (material.clearcoat > 0 || material.sheen_color.maxCoeff() > 0))
-      add_layers(hit, path, light);
-    // Glass only glows on its front, as in the shaders.
+    // Glass glows, and has layers and highlights, only on its front, as in the shaders.
     const bool is_shaded = hit.front || material.transmission <= 0;
+    if (sharp && is_shaded && (material.clearcoat > 0 || material.sheen_color.maxCoeff() > 0))
+      add_layers(hit, path, light);
     if (is_shaded && !material.mean_emission().isZero())
       (path.by_chance ? light.noisy : light.certain) +=
           path.fraction_of_glow(hit, sources_.glow) *
           path.fraction.cwiseProduct(material.emission_at(hit.uvs));
     if (sharp && is_shaded)
       (path.by_chance ? light.noisy : light.certain) +=
-          path.fraction.cwiseProduct(highlights(hit, surface.roughness, reflectance_of(surface)));
+          path.fraction.cwiseProduct(highlights(hit, surface.roughness, reflectance_at_right_angle(surface)));
     if (follow_glass(hit, surface, sampler, path, light)) continue;
     path.from = off_surface(hit.position, hit.face);
     if (follow_smooth(hit, surface, sampler, sharp, visible, path, light)) continue;

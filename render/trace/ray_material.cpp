@@ -183,6 +183,7 @@ RaySurface RayMaterial::surface(Hit& hit, float footprint, bool relief) const {
     add_fabric(hit, result);
   else if (details_)
     add_details(hit, result);
+  hit.smooth_normal = hit.normal;
   if (relief && has_relief()) add_relief(slope, hit);
   return result;
 }

@@ -114,6 +114,7 @@ const Vector2f& RayMesh::uv_of(std::size_t vertex, int set) const {
 bool RayMesh::is_plate() const {
   constexpr double kLeastFraction = 0.9;  // of the area
   constexpr double kParallel = 0.999;     // least cosine between two normals
+  constexpr double kThin = 0.05;          // greatest thickness, in square roots of the area of one side
   if (is_plate_) return *is_plate_;
   Eigen::Vector3d axis = Eigen::Vector3d::Zero();  // area of the largest triangle
   double all = 0, parallel = 0;
@@ -130,7 +131,15 @@ bool RayMesh::is_plate() const {
     all += area.norm();
     if (std::abs(area.dot(axis)) > kParallel * area.norm()) parallel += area.norm();
   }
-  is_plate_ = parallel >= kLeastFraction * all;
+  double low = 0, high = 0;  // along the axis, from the first corner
+  for (unsigned t = 0; t < count; ++t)
+    for (const Vector3f& p : corners(t, Eigen::Affine3f::Identity())) {
+      const double height = axis.dot((p - corners(0, Eigen::Affine3f::Identity())[0]).cast<double>());
+      low = std::min(low, height);
+      high = std::max(high, height);
+    }
+  // The areas are those of parallelograms, and both sides count.
+  is_plate_ = parallel >= kLeastFraction * all && high - low <= kThin * std::sqrt(parallel / 4);
   return *is_plate_;
 }
 
@@ -379,7 +388,7 @@ void RayScene::Object::describe_cloth(unsigned triangle, const Vector3f& from, c
   const Vector2f along = mixed(a.uv, b.uv, c.uv, uv);
   hit.object_position = {along.x(), along.y(), 0};
   hit.object_normal = Vector3f::UnitZ();
-  hit.uvs[0] = along.cwiseProduct(texture_from_uv);
+  hit.uvs[0] = hit.uvs[1] = along.cwiseProduct(texture_from_uv);
 }
 
 void RayScene::Object::describe_ball(unsigned ball, const Vector3f& from, const Vector3f& direction,

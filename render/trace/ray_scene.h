@@ -37,8 +37,8 @@ class RayMesh {
   std::array<Vector2f, 2> uvs_at(unsigned triangle, const Vector2f& barycentric) const;
   /// Returns the texture coordinates of a vertex.
   const Vector2f& uv_of(std::size_t vertex, int set) const;
-  /// Returns whether nearly the whole surface consists of parallel planes, as that of a pane. Light does not
-  /// change its direction on its way through a plate of glass.
+  /// Returns whether the mesh is a pane: nearly its whole surface consists of parallel planes that are close
+  /// to each other. Light has the same direction before and behind it, and nothing lies inside of it.
   bool is_plate() const;
   /// Returns the area of all triangles, in square units of the mesh.
   float area() const;
@@ -65,9 +65,10 @@ class RayMesh {
 struct Hit {
   float distance = 0;  ///< distance along the ray [m]
   Vector3f position = Vector3f::Zero();
-  Vector3f normal = Vector3f::Zero();  ///< smooth unit normal, on the side of the ray's origin
-  Vector3f face = Vector3f::Zero();    ///< unit normal of the triangle, on the side of the ray's origin
-  bool front = true;                   ///< whether the ray hits the front of the surface
+  Vector3f normal = Vector3f::Zero();         ///< smooth unit normal, on the side of the ray's origin
+  Vector3f smooth_normal = Vector3f::Zero();  ///< the same without the relief of the material
+  Vector3f face = Vector3f::Zero();  ///< unit normal of the triangle, on the side of the ray's origin
+  bool front = true;                 ///< whether the ray hits the front of the surface
   const RayMaterial* material = nullptr;
   bool is_cloth = false;
   float translucency = 0;  ///< translucency of a cloth; 0 for other objects

@@ -391,8 +391,6 @@ Eigen::VectorXd Articulation::stop_impulses() const {
   return solve_lcp((mobility + mobility.transpose()) / 2, speed).f;
 }
 
-/// Returns the mobility of a link. Joint limits that the impulse `push` would exceed are treated as
-/// constraints.
 /// Returns the stops against which a push on a link presses.
 std::vector<const Articulation::Stop*> Articulation::stops_against(uint32_t link, const Vec6& push) {
   if (stops_.empty()) return {};
@@ -417,6 +415,8 @@ Eigen::MatrixXd Articulation::stop_matrix(std::span<const Stop* const> pressed, 
   return among.ldlt().solve(on_link.transpose());
 }
 
+/// Returns the mobility of a link. Joint limits that the impulse `push` would exceed are treated as
+/// constraints.
 Mat6 Articulation::link_mobility(uint32_t link, const Vec6& push) {
   const std::lock_guard lock(responding_);
   place_for_impulses();
@@ -431,8 +431,8 @@ Mat6 Articulation::link_mobility(uint32_t link, const Vec6& push) {
 }
 
 std::vector<Mat6> Articulation::link_responses(uint32_t link, const Vec6& push) {
-  const Mat6 own = link_mobility(link, push);
   const std::lock_guard lock(responding_);
+  place_for_impulses();
   std::vector<Mat6> responses(bodies_.size());
   for (Eigen::Index k = 0; k < 6; ++k) {
     find_response(link, Vec6::Unit(k));
@@ -445,7 +445,8 @@ std::vector<Mat6> Articulation::link_responses(uint32_t link, const Vec6& push) 
       for (std::size_t s = 0; s < pressed.size(); ++s)
         responses[i] -= pressed[s]->response[i] * impulses.row(static_cast<Eigen::Index>(s));
   }
-  responses[link] = own;
+  const Mat6 own = responses[link];
+  responses[link] = (own + own.transpose()) / 2;
   return responses;
 }
 

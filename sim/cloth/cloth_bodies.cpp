@@ -9,7 +9,7 @@ namespace {
 constexpr Real kSingular = 1e-9;
 /// A body whose velocity changes by up to twice this in a sub-step of the world may accelerate steadily
 /// [m/s].
-constexpr Real kSmoothChange = 0.1;
+constexpr Real kSmoothChange = 0.25;
 
 /// Adds the mass matrix of a point mass at the lever arm `arm`.
 void add_point_mass(Real mass, const Vec3& arm, Mat6& matrix) {
@@ -41,6 +41,7 @@ void ClothBody::accelerate_steadily(const Vec3& gravity) {
   const Vec3 turn_bow = (angular_velocity_ - obstacle_.angular_velocity) * h_;
   // A greater deviation is due to an impact; the path then stays a line.
   const Real most = h_ * std::max(gravity.norm() * h_, kSmoothChange);
+  is_steady_ = bow.norm() <= most && turn_bow.norm() * obstacle_.extent <= most;
   if (bow.norm() <= most) bow_ = bow;
   if (turn_bow.norm() * obstacle_.extent <= most) turn_bow_ = turn_bow;
 }
@@ -61,18 +62,21 @@ void ClothBody::begin(Real from, Real to, Real dt) {
   const Vec6 rate = 2 / h_ * stacked(bow_, turn_bow_);
   steady_change_ = (to - from) * rate;
   left_ = (1 - to) * rate;
-  if (dt > 0) {
-    take_back(std::exchange(unreturned_lead_, {}), dt);
-    steady_change_ -= dt / h_ * free_change(expected_.force, expected_.torque);
-    take_back(dt / h_ * expected_, dt / 2);
-    lead_ = {};
-  }
-  end_ = displaced(on_path(to), obstacle_.centre, shift_, turn_);
-  centre_ = end_.point_to_world(obstacle_.centre);
   dt_ = dt;
   to_ = to;
+  move_end();
   is_still_ = start_.position == end_.position && start_.orientation.coeffs() == end_.orientation.coeffs() &&
               obstacle_.angular_velocity == Vec3::Zero() && obstacle_.surface_velocity == Vec3::Zero();
+}
+
+void ClothBody::take_back_contained() {
+  lead_ = {};
+  take_back(std::exchange(unreturned_lead_, {}), dt_);
+  const Wrench share = dt_ / h_ * expected_;
+  take_back(share, dt_ / 2);
+  if (!is_steady_ || is_zero(share)) return;
+  steady_change_ -= free_change(share.force, share.torque);
+  for (const Connected& c : connected_) c.body->steady_change_ -= c.response * stacked(share);
 }
 
 /// Takes back an impulse that the path contains, and the displacement by it in `displacing_time` [s].
@@ -82,6 +86,7 @@ void ClothBody::take_back(const Wrench& impulse, Real displacing_time) {
   take(change, -stacked(impulse));
   shift_ += displacing_time * change.head<3>();
   turn_ += displacing_time * change.tail<3>();
+  move_end();
   displace_connected(-displacing_time * stacked(impulse));
 }
 
@@ -254,12 +259,14 @@ Vec3 ClothBody::shorten(Real fraction, const Vec3& drift) {
   turn_ -= lost_turn;
   end_ = displaced(start_, obstacle_.centre, drift + fraction * displacement, fraction * turn);
   centre_ = end_.point_to_world(obstacle_.centre);
-  const Vec3 dv = -lost / dt_, dw = -lost_turn / dt_;
   touched = true;
-  reaction_.impulse += dv / obstacle_.inverse_mass;
-  reaction_.angular_impulse += obstacle_.inverse_inertia.inverse() * dw;
-  accelerate(dv, dw);
-  return dv;
+  const Vec6 change = -stacked(lost, lost_turn) / dt_;
+  const Vec6 impulse = jointed_ ? impulse_for(change)
+                                : stacked(change.head<3>() / obstacle_.inverse_mass,
+                                          obstacle_.inverse_inertia.inverse() * change.tail<3>());
+  take(change, impulse);
+  displace_connected(dt_ * impulse);
+  return change.head<3>();
 }
 
 Mat6 Carrier::carried(const ClothPoints& cloth) const {
@@ -274,6 +281,13 @@ void Carrier::apply_impulses(const Vec6& impulse, const Vec6& moving, ClothPoint
   for (uint32_t i : points)
     cloth.velocity[i] += padded(change.head<3>() + change.tail<3>().cross(cloth.at(i) - centre));
   place(cloth);
+}
+
+void Carrier::accelerate_whole(const Vec3& gain, ClothPoints& cloth) const {
+  const Vec3 before = body->velocity(body->centre());
+  body->apply_impulse(body->mass() * gain, body->centre());
+  // Joints may resist the impulse.
+  accelerate(body->is_jointed() ? Vec3(body->velocity(body->centre()) - before) : gain, cloth);
 }
 
 void Carrier::accelerate(const Vec3& dv, ClothPoints& cloth) const {

@@ -54,6 +54,9 @@ class ClothBody {
   /// Begins a sub-step of cloth, which covers the fractions `from` to `to` of the world's sub-step and lasts
   /// dt [s].
   void begin(Real from, Real to, Real dt);
+  /// Takes back the part of contained() that acts in the sub-step of cloth. It is called after begin() of all
+  /// bodies, because it also moves bodies to which joints connect this one.
+  void take_back_contained();
   Real duration() const { return dt_; }         ///< duration of the cloth's sub-step [s]
   const Pose& start() const { return start_; }  ///< pose at the start of the cloth's sub-step
   const Pose& end() const { return end_; }
@@ -190,6 +193,7 @@ class ClothBody {
   Vec6 left_ = Vec6::Zero();           // the same from its end to the end of the world's sub-step
   Real dt_ = 0, to_ = 0;               // dt_: length of the cloth's sub-step [s]; to_: its end as a fraction
                                        // of the world's sub-step
+  bool is_steady_ = false;             // whether the path has a constant acceleration
   bool is_still_ = false;              // whether its surface stood still at the start of the cloth's sub-step
   RestingContacts resting_;
   std::optional<Mat6> jointed_;  // mobility of a body with joints
@@ -214,6 +218,8 @@ struct Carrier {
   /// Applies an impulse to the body and its points, and moves the points. `moving`: the part of the impulse
   /// that also displaces the body within the sub-step, as in ClothBody::apply_pin_impulses().
   void apply_impulses(const Vec6& impulse, const Vec6& moving, ClothPoints& points) const;
+  /// Gives body and points the impulses that would change their velocity by `gain` if the body were free.
+  void accelerate_whole(const Vec3& gain, ClothPoints& points) const;
   /// Applies a change of the body's velocity and angular velocity to the points. It must have been computed
   /// with the mass of the points included. Other changes of the body's velocity are applied to the points in
   /// ClothSystem::apply_pin_impulses_to_bodies().

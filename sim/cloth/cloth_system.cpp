@@ -98,6 +98,7 @@ Real ClothSystem::parts_in(Real h, Real speed) const {
 
 void ClothSystem::substep(Real from, Real to, Real dt) {
   for (ClothBody& body : bodies_) body.begin(from, to, dt);
+  for (ClothBody& body : bodies_) body.take_back_contained();
   points_.start = points_.position;
   cuts_.clear();
   move_held();

@@ -180,8 +180,9 @@ class ClothSystem {
   std::vector<Frame> frames_;       // by piece
   std::vector<uint8_t> shortened_;  // by point: the frame in which its move was shortened in this sub-step
   struct Frozen {
-    uint32_t since = 0;   // number of sub-steps in which shortening stopped the whole cloth
-    uint32_t thawed = 0;  // number of sub-steps left in which bodies near it do not stop it
+    uint32_t since = 0;    // number of successive sub-steps in which shortening stopped the whole cloth
+    uint32_t thawed = 0;   // number of sub-steps left in which bodies near it do not stop it
+    bool stopped = false;  // whether shortening stopped it in the last sub-step
   };
   std::vector<Frozen> frozen_;     // by cloth
   std::vector<uint32_t> lowered_;  // points whose fractions were lowered in a round

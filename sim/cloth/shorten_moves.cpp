@@ -21,8 +21,9 @@ namespace {
 constexpr int kMaxRounds = 64;
 /// Greatest number of passes for bodies that turn.
 constexpr int kMaxPasses = 6;
-/// A cloth that flies near a body is frozen after this many sub-steps in which shortening left its points
-/// less than this fraction of their moves. Then it is shortened in its own frame for so many sub-steps.
+/// A cloth near a body is frozen after this many successive sub-steps in which shortening left its points
+/// less than this fraction of their moves. Then its pieces that no fixed object holds are shortened in their
+/// own frames for so many sub-steps.
 constexpr uint32_t kFrozenAfter = 3, kThawedFor = 60;
 constexpr Real kFrozenMove = 0.01;
 
@@ -140,7 +141,10 @@ bool ClothSystem::find_drifts() {
 void ClothSystem::shorten_moves(Real dt) {
   const bool self = !self_contacts_.empty();
   if (limit_.empty() && !self) return;
-  for (Frozen& frozen : frozen_) frozen.thawed -= frozen.thawed > 0;
+  for (Frozen& frozen : frozen_) {
+    frozen.thawed -= frozen.thawed > 0;
+    if (!std::exchange(frozen.stopped, false)) frozen.since = 0;
+  }
   const auto find_doubtful = [&] {
     self ? self_contacts_.find_doubtful(points_, dt, drift_) : self_contacts_.find_none();
   };
@@ -216,8 +220,8 @@ void ClothSystem::watch_frozen(std::span<const Vec4> velocity, Real dt) {
   }
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     Frozen& frozen = frozen_[c];
-    const bool stopped = moved[c] < kFrozenMove * kFrozenMove * would_move[c];
-    frozen.since = stopped ? frozen.since + 1 : 0;
+    frozen.stopped = moved[c] < kFrozenMove * kFrozenMove * would_move[c];
+    frozen.since += frozen.stopped;
     if (frozen.since >= kFrozenAfter) frozen = {.thawed = kThawedFor};
   }
 }
@@ -309,8 +313,7 @@ void ClothSystem::restore_momenta() {
     const Frame& frame = frame_of(carrier.points[0]);
     if (frame.anchored) continue;
     const Vec3 gain = (frame.momentum / frame.total_mass).head<3>();
-    carrier.body->apply_impulse(carrier.body->mass() * gain, carrier.body->centre());
-    carrier.accelerate(gain, points_);
+    carrier.accelerate_whole(gain, points_);
   }
 }
 
@@ -383,10 +386,7 @@ void ClothSystem::stop_bodies(Real dt) {
     const Vec3 gain = recoil[c] * taken[c];
     for (std::size_t i = first_[c], end = i + cloths_[c]->points.size(); i < end; ++i)
       if (points_.inverse_mass[i] > 0) kick_[i] += padded(gain);
-    for (const Carrier* carrier : carriers_of(c)) {
-      carrier->body->apply_impulse(carrier->body->mass() * gain, carrier->body->centre());
-      carrier->accelerate(gain, points_);
-    }
+    for (const Carrier* carrier : carriers_of(c)) carrier->accelerate_whole(gain, points_);
   }
 }
 

@@ -16,7 +16,6 @@ class BodyLoad {
   /// the smaller of its last two values.
   void expect(const RigidBody& body);
   /// Expects no force in the sub-step that begins.
-  void expect_last() { expected_ = last_[0]; }
   void expect_nothing() { expected_ = {}; }
   const Wrench& expected() const { return expected_; }  ///< [N], [N m]
   /// Ends a sub-step with the force that has acted.

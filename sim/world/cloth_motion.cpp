@@ -60,16 +60,17 @@ void ClothMotion::begin_step() {
 void ClothMotion::begin_substep(Real time, Real h, BodyReactions& reactions, StepReport& report) {
   for (const Push& push : std::exchange(pushes_, {}))
     reactions.add_force(push.body, {push.impulse.force / h, push.impulse.torque / h});
-  if (system_.empty()) loads_.clear();
   std::erase_if(loads_, [&](const auto& entry) { return !world_.body_at(entry.first).is_awake(); });
   std::vector<Reaction> leads;
   for (auto& [slot, load] : loads_) {
     const Body& body = world_.body_at(slot);
-    std::ranges::binary_search(resting_, slot) ? load.force.expect_nothing() : load.force.expect(body.rigid);
+    const bool is_over = system_.empty() || std::ranges::binary_search(resting_, slot);
+    is_over ? load.force.expect_nothing() : load.force.expect(body.rigid);
     reactions.add_force(body.handle, load.force.expected());
     if (!is_zero(load.lead)) leads.push_back({slot, load.lead.force, load.lead.torque});
   }
   reactions.apply(leads, time, report);
+  if (system_.empty()) loads_.clear();
 }
 
 /// Returns the bodies that cloths may touch in a sub-step of length h, and the bodies that hold pins.
@@ -151,14 +152,13 @@ void ClothMotion::find_pressed(std::span<ContactPair* const> pairs) {
   for (Body* body : uncovered) active_.wake(*body);
 }
 
-/// Lets bodies with joints move as the joints permit.
+/// Lets bodies with joints that cloth pulled in the last sub-step move as the joints permit.
 void ClothMotion::set_joints(std::span<ClothBody> near, Real h, const BodyReactions& reactions) const {
   for (ClothBody& at : near) {
     const uint32_t slot = at.obstacle().body;
-    if (!at.is_dynamic()) continue;
     const auto load = loads_.find(slot);
-    const Vec6 push =
-        load == loads_.end() ? Vec6(Vec6::Zero()) : Vec6(h * stacked(load->second.force.last()));
+    if (load == loads_.end() || !at.is_dynamic()) continue;
+    const Vec6 push = h * stacked(load->second.force.last());
     std::vector<ClothBody::Connected> connected;
     const std::map<uint32_t, Mat6> responses = reactions.link_responses(slot, push);
     if (responses.empty()) continue;

@@ -40,7 +40,8 @@ class ClothMotion {
 
   void begin_step();
   /// Adds the expected loads of bodies in the sub-step of length h [s] that begins at `time` [s], as constant
-  /// forces. A body that cloth pressed against others in the last sub-step gets the force that this needs.
+  /// forces, and the leads of their velocities (ClothBody::lead()) as impulses. A body that cloth pressed
+  /// against others in the last sub-step gets the force that this needs.
   void begin_substep(Real time, Real h, BodyReactions& reactions, StepReport& report);
   /// Moves all cloths through a sub-step, displaces bodies where cloths push them, and applies the impulses
   /// on the bodies. `pairs`: the pairs of bodies of this sub-step, which may press cloth.

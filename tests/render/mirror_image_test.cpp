@@ -153,7 +153,7 @@ TEST(MirrorImage, ShowsNormalMaps) {
   expect_equal("normal map", add_bumps);
   expect_equal("given tangents", [&](Shown& s) {
     add_bumps(s);
-    s.mesh.tangents.assign(4, Vector4f(-1, 0, 0, 1));
+    s.mesh.tangents.assign(4, Vector4f(0, 1, 0, -1));
   });
   expect_equal("moved and flattened map", [&](Shown& s) {
     add_bumps(s);
@@ -173,7 +173,7 @@ TEST(MirrorImage, ShowsNormalMaps) {
   for (const bool tangents : {false, true})
     expect_equal("mirroring transform", [&](Shown& s) {
       add_bumps(s);
-      if (tangents) s.mesh.tangents.assign(4, Vector4f(-1, 0, 0, 1));
+      if (tangents) s.mesh.tangents.assign(4, Vector4f(0, 1, 0, 1));
       s.world_from_mesh = place_at({0, 0, 3}) * Eigen::Scaling(-1.0f, 1.0f, 1.0f);
     });
 }
@@ -250,6 +250,17 @@ TEST(MirrorImage, ShowsReflectionsAndLayers) {
           s.world_from_mesh = place_at({0, 0, 3}, turn_deg);
         },
         0.06f);
+    // The coat has no relief.
+    expect_equal(
+        "clearcoat over a normal map",
+        [&](Shown& s) {
+          s.textures = {bumps()};
+          s.material.normal_texture.image = 0;
+          s.material.clearcoat = 1;
+          s.material.clearcoat_roughness = 0.1f;
+          s.world_from_mesh = place_at({0, 0, 3}, turn_deg);
+        },
+        0.06f);
     expect_equal("sheen", [&](Shown& s) {
       s.material.color = {0.1f, 0.1f, 0.1f, 1};
       s.material.sheen_color = {1, 0.2f, 0.2f};
@@ -267,7 +278,7 @@ TEST(MirrorImage, ShowsReflectionsAndLayers) {
 
 // The relief of sand and the roughness of planks are visible in highlights.
 TEST(MirrorImage, ShowsTheReliefOfPatterns) {
-  for (const Pattern pattern : {Pattern::brick, Pattern::sand, Pattern::lawn})
+  for (const Pattern pattern : {Pattern::brick, Pattern::sand, Pattern::lawn, Pattern::planks})
     EXPECT_LT(daylight().difference([&](SmallStage& s) {
       Shown shown;
       shown.material.pattern = pattern;
