@@ -93,8 +93,8 @@ struct Response {
   static Response seen(const Hit& hit, const RaySurface& surface, const Vector3f& direction,
                        const Vector3f& to_sun) {
     const Vector3f f0 = reflectance_at_right_angle(surface), one = Vector3f::Ones();
-    const float nv = facing_cosine(hit, direction), from_sky = sheen_in_sky(nv_of_sheen);
-    const Vector3f mirrored = reflectance_of(f0, surface.roughness, nv);
+    const float nv = facing_cosine(hit, direction), from_sky = sheen_in_sky(nv);
+    const Vector3f mirrored = sky_reflectance(f0, surface.roughness, nv);
     const Vector3f h = (to_sun - direction).normalized();
     Vector3f diffuse = (1 - surface.metallic) * surface.color.head<3>(), sheen;
     if (hit.is_cloth) {
