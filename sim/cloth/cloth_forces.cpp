@@ -211,12 +211,11 @@ void add_outer_forces(const Cloth& cloth, std::size_t first, const ClothWeather&
   set_inertia(run);
 }
 
-bool renew_gas(Cloth& cloth, std::size_t first, const ClothWeather& weather, ClothPoints& points) {
-  if (cloth.def.pressure == 0 || cloth.stopped || !(cloth.gas.remaining_fraction() > 0)) return false;
+bool step_leak(Cloth& cloth, std::size_t first, const ClothWeather& weather, ClothPoints& points) {
+  if (!leaks(cloth)) return false;
   const std::size_t end = first + cloth.points.size();
   for (std::size_t i = first; i < end; ++i) cloth.points[i - first] = points.at(i);
-  if (leaks(cloth))
-    cloth.gas.leak(cloth.points, gas_volume(cloth), overpressure(cloth), gas_density(cloth), weather.h);
+  cloth.gas.leak(cloth.points, gas_volume(cloth), overpressure(cloth), gas_density(cloth), weather.h);
   add_outer_forces(cloth, first, weather, points);
   for (std::size_t i = first; i < end; ++i)
     if (points.inverse_mass[i] > 0) points.inverse_mass[i] = 1 / points.mass[i];

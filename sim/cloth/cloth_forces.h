@@ -26,9 +26,9 @@ ClothGasState gas_state(const Cloth& cloth);
 void add_outer_forces(const Cloth& cloth, std::size_t first, const ClothWeather& weather,
                       ClothPoints& points);
 
-/// Calls add_outer_forces() for the next sub-step of a cloth with gas. A pressure that stays constant over a
-/// sub-step of the world would add energy to its oscillations. The gas of a torn cloth flows out before, for
-/// the time weather.h [s]. Returns false if there is no gas.
-bool renew_gas(Cloth& cloth, std::size_t first, const ClothWeather& weather, ClothPoints& points);
+/// Lets the gas of a torn cloth flow out for the time weather.h [s], and calls add_outer_forces() for the
+/// next sub-step of the cloth. A bursting cloth moves too fast for forces that are constant over a sub-step
+/// of the world. Returns false if no gas flows.
+bool step_leak(Cloth& cloth, std::size_t first, const ClothWeather& weather, ClothPoints& points);
 
 }  // namespace offstage::sim

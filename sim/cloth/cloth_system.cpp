@@ -44,7 +44,7 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
     next.time += (k + 1) * dt_;
     next.h = dt_;
     for (std::size_t c = 0; c < cloths_.size(); ++c)
-      if (renew_gas(*cloths_[c], first_[c], next, points_)) air_[c].expire();
+      if (step_leak(*cloths_[c], first_[c], next, points_)) air_[c].expire();
     // A body that moves by more than an edge of the cloth in a sub-step of the world must pass through the
     // holes that it has torn. So torn cloth is updated on the way.
     since_look += speed * dt_;
