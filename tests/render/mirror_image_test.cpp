@@ -276,9 +276,9 @@ TEST(MirrorImage, ShowsReflectionsAndLayers) {
   EXPECT_LT(fog.difference([](SmallStage& s) { Shown().add_to(s); }), 0.01f);
 }
 
-// The relief of sand and the roughness of planks are visible in highlights.
+// Relief is visible in highlights.
 TEST(MirrorImage, ShowsTheReliefOfPatterns) {
-  for (const Pattern pattern : {Pattern::brick, Pattern::sand, Pattern::lawn, Pattern::planks})
+  for (const Pattern pattern : {Pattern::brick, Pattern::sand, Pattern::lawn})
     EXPECT_LT(daylight().difference([&](SmallStage& s) {
       Shown shown;
       shown.material.pattern = pattern;
