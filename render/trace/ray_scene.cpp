@@ -131,13 +131,12 @@ bool RayMesh::is_plate() const {
     all += area.norm();
     if (std::abs(area.dot(axis)) > kParallel * area.norm()) parallel += area.norm();
   }
-  double low = 0, high = 0;  // along the axis, from the first corner
-  for (unsigned t = 0; t < count; ++t)
-    for (const Vector3f& p : corners(t, Eigen::Affine3f::Identity())) {
-      const double height = axis.dot((p - corners(0, Eigen::Affine3f::Identity())[0]).cast<double>());
-      low = std::min(low, height);
-      high = std::max(high, height);
-    }
+  double low = 0, high = 0;  // along the axis, from the first vertex
+  for (const Vector4f& p : positions) {
+    const double height = axis.dot((p - positions.front()).head<3>().cast<double>());
+    low = std::min(low, height);
+    high = std::max(high, height);
+  }
   // The areas are those of parallelograms, and both sides count.
   is_plate_ = parallel >= kLeastFraction * all && high - low <= kThin * std::sqrt(parallel / 4);
   return *is_plate_;

@@ -41,9 +41,10 @@ void ClothBody::accelerate_steadily(const Vec3& gravity) {
   const Vec3 turn_bow = (angular_velocity_ - obstacle_.angular_velocity) * h_;
   // A greater deviation is due to an impact; the path then stays a line.
   const Real most = h_ * std::max(gravity.norm() * h_, kSmoothChange);
-  is_steady_ = bow.norm() <= most && turn_bow.norm() * obstacle_.extent <= most;
-  if (bow.norm() <= most) bow_ = bow;
-  if (turn_bow.norm() * obstacle_.extent <= most) turn_bow_ = turn_bow;
+  const bool moves_smoothly = bow.norm() <= most, turns_smoothly = turn_bow.norm() * obstacle_.extent <= most;
+  if (moves_smoothly) bow_ = bow;
+  if (turns_smoothly) turn_bow_ = turn_bow;
+  is_steady_ = moves_smoothly && turns_smoothly;
 }
 
 /// Returns the pose on the path that the world computed, without displacement by cloth.
@@ -158,6 +159,11 @@ void ClothBody::displace_connected(const Vec6& impulse) {
     c.body->turn_ += moved.tail<3>();
     c.body->move_end();
   }
+}
+
+Pose ClothBody::own_end() const {
+  if (moved_by_others_.isZero(0)) return end_;
+  return displaced(end_, obstacle_.centre, -moved_by_others_.head<3>(), -moved_by_others_.tail<3>());
 }
 
 /// Updates the pose at the end of the cloth's sub-step.
@@ -275,9 +281,17 @@ Mat6 Carrier::carried(const ClothPoints& cloth) const {
   return matrix;
 }
 
-void Carrier::apply_impulses(const Vec6& impulse, const Vec6& moving, ClothPoints& cloth) const {
+void Carrier::apply_loads(const Vec6& impulse, const Vec6& moving, ClothPoints& cloth) const {
+  const Mat6 mass = carried(cloth);
+  // A constant force displaces the body by half of its impulse.
+  body->set_lead(moving - impulse / 2, mass);
+  apply_impulses(impulse, moving, mass, cloth);
+}
+
+void Carrier::apply_impulses(const Vec6& impulse, const Vec6& moving, const Mat6& mass,
+                             ClothPoints& cloth) const {
   const Vec3 centre = body->centre();  // before it moves
-  const Vec6 change = body->apply_pin_impulses(impulse, moving, carried(cloth));
+  const Vec6 change = body->apply_pin_impulses(impulse, moving, mass);
   for (uint32_t i : points)
     cloth.velocity[i] += padded(change.head<3>() + change.tail<3>().cross(cloth.at(i) - centre));
   place(cloth);

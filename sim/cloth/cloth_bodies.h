@@ -60,6 +60,8 @@ class ClothBody {
   Real duration() const { return dt_; }         ///< duration of the cloth's sub-step [s]
   const Pose& start() const { return start_; }  ///< pose at the start of the cloth's sub-step
   const Pose& end() const { return end_; }
+  /// The same without displacements by impulses on bodies to which joints connect this one.
+  Pose own_end() const;
   const Solid& solid() const { return obstacle_.solid; }
   const Obstacle& obstacle() const { return obstacle_; }
   bool is_dynamic() const { return obstacle_.is_dynamic(); }
@@ -217,13 +219,21 @@ struct Carrier {
   void place(ClothPoints& points) const;
   /// Applies an impulse to the body and its points, and moves the points. `moving`: the part of the impulse
   /// that also displaces the body within the sub-step, as in ClothBody::apply_pin_impulses().
-  void apply_impulses(const Vec6& impulse, const Vec6& moving, ClothPoints& points) const;
+  void apply_impulses(const Vec6& impulse, const Vec6& moving, ClothPoints& cloth) const {
+    apply_impulses(impulse, moving, carried(cloth), cloth);
+  }
+  /// The same for the impulses of springs and the inertia of the points, which also determine the lead of the
+  /// body.
+  void apply_loads(const Vec6& impulse, const Vec6& moving, ClothPoints& cloth) const;
   /// Gives body and points the impulses that would change their velocity by `gain` if the body were free.
   void accelerate_whole(const Vec3& gain, ClothPoints& points) const;
   /// Applies a change of the body's velocity and angular velocity to the points. It must have been computed
   /// with the mass of the points included. Other changes of the body's velocity are applied to the points in
   /// ClothSystem::apply_pin_impulses_to_bodies().
   void accelerate(const Vec3& dv, ClothPoints& points) const;
+
+ private:
+  void apply_impulses(const Vec6& impulse, const Vec6& moving, const Mat6& mass, ClothPoints& cloth) const;
 };
 
 }  // namespace offstage::sim

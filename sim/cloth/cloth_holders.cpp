@@ -90,9 +90,7 @@ void ClothSystem::apply_pin_impulses_to_bodies(Real dt) {
       moving += (Vec6() << early, arm.cross(early)).finished();
       points_.velocity[i] = padded(body.velocity_now(p));
     }
-    // A constant force displaces the body by half of its impulse.
-    body.set_lead(moving - sum / 2, carrier.carried(points_));
-    carrier.apply_impulses(sum, moving, points_);
+    carrier.apply_loads(sum, moving, points_);
   }
   for (const Held& held : held_)
     if (held.body && !held.body->is_dynamic())

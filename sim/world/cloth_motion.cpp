@@ -251,7 +251,7 @@ std::vector<Reaction> ClothMotion::answer(std::span<const ClothBody> near, Real 
       if (at.is_jointed()) {
         jointed[body.handle.index] = at.displacing_impulse();
       } else {
-        body.pose = at.end();
+        body.pose = at.own_end();
         body.rigid.place(body.pose);
       }
     }

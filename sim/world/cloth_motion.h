@@ -1,7 +1,7 @@
 #pragma once
 /// Motion of cloths through a sub-step (physics F6-F8). Cloths move after bodies and before particles, and
 /// collide with the bodies along the paths of the sub-step. Impulses of cloths change the velocities of
-/// bodies from the next sub-step on.
+/// bodies from the next sub-step on; the expected ones act as forces while the bodies move.
 
 #include <map>
 #include <optional>
