@@ -91,11 +91,7 @@ void ClothSystem::assemble() {
   points_.supported.assign(points_.size(), 0);
   points_.triangle_supports.resize(cloths_.size());
   points_.pin_impulse.assign(points_.size(), Vec4::Zero());
-  springs_ = std::vector<ClothSprings>(cloths_.size());
-  for (std::size_t c = 0; c < cloths_.size(); ++c)
-    if (cloths_[c]->def.integrator == ClothIntegrator::relaxed) springs_[c].assign(springs_of(c), points_);
-  air_.resize(cloths_.size());
-  for (std::size_t c = 0; c < cloths_.size(); ++c) air_[c].assign(*cloths_[c], first_[c]);
+  assign_forces();
   drift_.assign(points_.size(), Vec4::Zero());
   pieces_.assign(points_.size());
   for (const ClothSpring& s : all_springs_) pieces_.join(s.a, s.b);
@@ -104,6 +100,18 @@ void ClothSystem::assemble() {
   limit_.assign(std::move(limits), std::move(ties), points_.size());
   self_contacts_.assign(std::move(colliding), points_);
   corner_contacts_.assign(std::move(touching), points_);
+}
+
+/// Prepares the springs, the gas and the air of each cloth.
+void ClothSystem::assign_forces() {
+  springs_ = std::vector<ClothSprings>(cloths_.size());
+  gas_.clear();
+  air_.resize(cloths_.size());
+  for (std::size_t c = 0; c < cloths_.size(); ++c) {
+    if (cloths_[c]->def.integrator == ClothIntegrator::relaxed) springs_[c].assign(springs_of(c), points_);
+    gas_.emplace_back(*cloths_[c]);
+    air_[c].assign(*cloths_[c], first_[c]);
+  }
 }
 
 Aabb ClothSystem::reach_of(const Cloth& cloth, Real h) {

@@ -2,35 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <numbers>
+
+#include "sim/cloth/gas_force.h"
 
 namespace offstage::sim {
 namespace {
-
-constexpr Real kAirDensity = 1.2;  // density of leaking gas if none is given [kg/m^3]
-
-/// Returns the volume inside a cloth [m^3], at least a tenth of the volume at rest. This minimum keeps cloth
-/// that is crushed flat from bursting. It also lets torn cloth, which encloses nothing, lose its gas.
-Real gas_volume(const Cloth& cloth) {
-  return std::max(cloth.gas.volume(cloth.points, cloth.triangles), 0.1 * cloth.rest_volume);
-}
-
-/// Returns the overpressure of the gas filled in so far at the current volume, without leaks [Pa].
-Real overpressure(const Cloth& cloth) {
-  const Real let_in = cloth.age < cloth.def.inflate_time ? cloth.age / cloth.def.inflate_time : 1;
-  return let_in * cloth.def.pressure * cloth.rest_volume / gas_volume(cloth);
-}
-
-Real gas_density(const Cloth& cloth) {
-  const Real density = cloth.def.gas_density.value_or(cloth.def.air.density);
-  return density > 0 ? density : kAirDensity;
-}
-
-/// Whether gas flows out of a tear.
-bool leaks(const Cloth& cloth) {
-  return cloth.def.pressure != 0 && cloth.version > 0 && cloth.gas.remaining_fraction() > 0 && !cloth.stopped;
-}
 
 /// The points of one cloth, to which forces are added.
 struct Run {
@@ -117,22 +93,12 @@ void add(const PairLaw&, Run&) {
   static_assert(kIsPairLaw<PairLaw>);
 }
 
-/// Adds a pressure inside the cloth, equal on all triangles.
-void push_out(Run& run, Real pressure) {
-  for (const Triangle& t : run.cloth.triangles) {
-    const Vec3 a = run.at(t[0]);
-    const Vec3 third = pressure / 6 * (run.at(t[1]) - a).cross(run.at(t[2]) - a);
-    for (uint32_t corner : t)
-      run.points.outer[run.first + corner] += padded(third / run.cloth.masses[corner]);
-  }
-}
-
 /// Adds the effect of the weight of gas and air. The pressure of a gas at rest grows downwards by its weight.
 /// The corners of a triangle get the forces of a pressure that is linear over it. So the force on a closed
 /// cloth is exactly the buoyancy of Archimedes' principle, and acts at the centre of the volume.
 void lift(Run& run, const Vec3& gravity) {
   const Cloth& cloth = run.cloth;
-  if (!cloth.def.gas_density) return;
+  if (cloth.def.pressure == 0 || !cloth.def.gas_density) return;
   const Vec3 slope =
       cloth.gas.remaining_fraction() * (*cloth.def.gas_density - cloth.def.air.density) * gravity;
   if (slope.isZero(0)) return;
@@ -145,27 +111,6 @@ void lift(Run& run, const Vec3& gravity) {
     for (std::size_t k = 0; k < 3; ++k)
       run.points.outer[run.first + t[k]] += padded((sum + p[k]) / 12 / cloth.masses[t[k]] * area);
   }
-}
-
-/// Returns the current overpressure [Pa], without the weight of the gas, which lift() adds.
-Real acting_pressure(const Cloth& cloth) {
-  return cloth.gas.remaining_fraction() * overpressure(cloth);
-}
-
-void inflate(Run& run, const Vec3& gravity) {
-  const Cloth& cloth = run.cloth;
-  if (cloth.def.pressure == 0) return;
-  push_out(run, acting_pressure(cloth));
-  lift(run, gravity);
-}
-
-/// Returns the mass of the gas and air that a skin of unit area moves when it bursts [kg/m^2]. For a sphere
-/// of radius R that oscillates in air, this is rho_air R / 2 and rho_gas R for the gas in it (Lamb,
-/// Hydrodynamics, art. 92). It is ten times the mass of a balloon's skin, which would otherwise move away
-/// faster than the gas.
-Real moved_with_skin(const Cloth& cloth) {
-  const Real radius = std::cbrt(3 * cloth.rest_volume / (4 * std::numbers::pi));
-  return cloth.gas.remaining_fraction() * radius * (cloth.def.air.density / 2 + gas_density(cloth));
 }
 
 /// Sets the points' masses. The masses of a torn skin include the gas that it moves.
@@ -189,11 +134,6 @@ void set_inertia(Run& run) {
 
 }  // namespace
 
-ClothGasState gas_state(const Cloth& cloth) {
-  if (cloth.def.pressure == 0) return {};
-  return {cloth.gas.volume(cloth.points, cloth.triangles), acting_pressure(cloth)};
-}
-
 void add_outer_forces(const Cloth& cloth, std::size_t first, const ClothWeather& weather,
                       ClothPoints& points) {
   Real total = 0;
@@ -207,7 +147,7 @@ void add_outer_forces(const Cloth& cloth, std::size_t first, const ClothWeather&
   fill(points.field_drag, Real{0});
   for (const ForceDef* f : weather.forces)
     if (f->acts_on(cloth.handle)) std::visit([&](const auto& effect) { add(effect, run); }, f->effect);
-  inflate(run, weather.gravity);
+  lift(run, weather.gravity);
   set_inertia(run);
 }
 
@@ -215,7 +155,7 @@ bool step_leak(Cloth& cloth, std::size_t first, const ClothWeather& weather, Clo
   if (!leaks(cloth)) return false;
   const std::size_t end = first + cloth.points.size();
   for (std::size_t i = first; i < end; ++i) cloth.points[i - first] = points.at(i);
-  cloth.gas.leak(cloth.points, gas_volume(cloth), overpressure(cloth), gas_density(cloth), weather.h);
+  leak(cloth, weather.h);
   add_outer_forces(cloth, first, weather, points);
   for (std::size_t i = first; i < end; ++i)
     if (points.inverse_mass[i] > 0) points.inverse_mass[i] = 1 / points.mass[i];

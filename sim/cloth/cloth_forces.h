@@ -1,6 +1,6 @@
 #pragma once
-/// External forces on cloth: gravity, fields and internal pressure (physics F8, P2). The forces of the air on
-/// its triangles are in air_drag.h.
+/// External forces on cloth: gravity, fields and buoyancy (physics F8, P2). The forces of the air on its
+/// triangles are in air_drag.h, the pressure of gas in gas_force.h.
 
 #include <span>
 
@@ -16,9 +16,6 @@ struct ClothWeather {
   Vec3 gravity, wind;
   std::span<const ForceDef* const> forces;
 };
-
-/// The gas inside of a cloth with `pressure`; zero for other cloths.
-ClothGasState gas_state(const Cloth& cloth);
 
 /// Sets for each point of a cloth: mass, acceleration by outer forces, velocity of the air, and rate of
 /// linear drag. `first`: index of the cloth's first point. In a torn cloth under pressure, the mass includes

@@ -1,6 +1,6 @@
 #pragma once
 /// Integrators of cloth: they move the points of a cloth through a sub-step of length h [s] under springs,
-/// bending and outer accelerations. `relaxed` and `implicit` also keep points above their supports
+/// bending, gas and outer accelerations. `relaxed` and `implicit` also keep points above their supports
 /// (ClothPoints::supports), and `relaxed` keeps triangles above theirs and limits bending. Drag is implicit
 /// in all of them (air_drag.h). Pinned points must already have been moved. If the velocity at the end
 /// differs from displacement / h, the difference is stored in `kick`.
@@ -14,6 +14,7 @@
 #include "sim/cloth/cloth.h"
 #include "sim/cloth/cloth_points.h"
 #include "sim/cloth/cloth_springs.h"
+#include "sim/cloth/gas_force.h"
 
 namespace offstage::sim {
 
@@ -24,6 +25,7 @@ struct ClothRange {
   std::span<const ClothSpring> springs;
   ClothBending& bending;
   AirDrag& air;
+  GasForce& gas;
   BendLimit* bend_limit;  ///< null: none
 
   /// Returns the supports of this cloth's points.

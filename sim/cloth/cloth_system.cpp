@@ -189,9 +189,10 @@ void ClothSystem::integrate(Real dt) {
     if (held.body) points_.start[held.point] = padded(held.body->start().point_to_world(held.position));
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     const ClothIntegrator integrator = cloths_[c]->def.integrator;
-    const ClothRange range{first_[c],     first_[c] + cloths_[c]->points.size(),
-                           springs_of(c), cloths_[c]->bending,
-                           air_[c],       bend_limit_of(c)};
+    const ClothRange range{first_[c],       first_[c] + cloths_[c]->points.size(),
+                           springs_of(c),   cloths_[c]->bending,
+                           air_[c],         gas_[c],
+                           bend_limit_of(c)};
     if (c > 0)  // cloths that were integrated before may have moved the bodies
       update_supports(range);
     if (integrator == ClothIntegrator::symplectic) step_symplectic(points_, range, dt);

@@ -19,6 +19,7 @@
 #include "sim/cloth/cloth_springs.h"
 #include "sim/cloth/cloth_state.h"
 #include "sim/cloth/corner_contacts.h"
+#include "sim/cloth/gas_force.h"
 #include "sim/cloth/self_contacts.h"
 #include "sim/cloth/stretch_limit.h"
 
@@ -104,6 +105,7 @@ class ClothSystem {
 
   // In cloth_assembly.cpp:
   void assemble();
+  void assign_forces();
 
   // In cloth_holders.cpp:
   void find_held(Real time, std::span<ClothBody> bodies);
@@ -163,6 +165,7 @@ class ClothSystem {
   ClothPoints points_;
   std::vector<ClothSprings> springs_;   // by `relaxed` cloth
   std::vector<AirDrag> air_;            // by cloth
+  std::vector<GasForce> gas_;           // by cloth
   std::vector<BendLimit> bend_limits_;  // one for each cloth with such a limit
   StretchLimit limit_;
   ClothContacts contacts_;

@@ -15,6 +15,7 @@ void accelerate(const ClothPoints& points, const ClothRange& cloth, const Spring
     cloth.bending.add_forces(x, 1, a);
     if (cloth.bending.damping() > 0) cloth.bending.multiply(v, -cloth.bending.damping(), a);
   }
+  if (cloth.gas.acts()) cloth.gas.add_forces(x, 1, a);
   for (const ClothSpring& s : cloth.springs) {
     const std::size_t i = s.a - cloth.begin, j = s.b - cloth.begin;
     const Vec4 d = x[i] - x[j];
@@ -45,10 +46,11 @@ void drag_gains(const ClothRange& cloth, const SpringRun& v, Real h, SpringRun& 
 /// Adds the impulses that springs exert on pinned points within the time h.
 void pass_on(ClothPoints& points, const ClothRange& cloth, const SpringRun& x, const SpringRun& v, Real h,
              Real dt) {
-  if (!cloth.bending.empty()) {
+  if (!cloth.bending.empty() || cloth.gas.acts()) {
     SpringRun force(x.size(), Vec4::Zero());
-    cloth.bending.add_forces(x, 1, force);
+    if (!cloth.bending.empty()) cloth.bending.add_forces(x, 1, force);
     if (cloth.bending.damping() > 0) cloth.bending.multiply(v, -cloth.bending.damping(), force);
+    if (cloth.gas.acts()) cloth.gas.add_forces(x, 1, force);
     for (std::size_t i = 0; i < force.size(); ++i)
       if (is_held(points, cloth.begin + i)) points.pin_impulse[cloth.begin + i] += h * dt * force[i];
   }

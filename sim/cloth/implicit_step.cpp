@@ -145,10 +145,13 @@ class ImplicitSystem {
 
   /// Adds the impulses of springs on pinned points, for points that move with v throughout the step.
   void pass_on(ClothPoints& points, const SpringRun& v, Real h) const {
-    if (bending_ > 0) {
+    if (bending_ > 0 || cloth_.gas.acts()) {
       SpringRun force(size_, Vec4::Zero());
-      cloth_.bending.add_forces(cloth_.part(points.start), h * h, force);
-      cloth_.bending.multiply(of_points(v), -h * bending_, force);
+      if (bending_ > 0) {
+        cloth_.bending.add_forces(cloth_.part(points.start), h * h, force);
+        cloth_.bending.multiply(of_points(v), -h * bending_, force);
+      }
+      if (cloth_.gas.acts()) cloth_.gas.add_forces(cloth_.part(points.start), h * h, force);
       for (std::size_t i = 0; i < force.size(); ++i)
         if (is_held(points, cloth_.begin + i)) points.pin_impulse[cloth_.begin + i] += force[i];
     }
@@ -201,6 +204,7 @@ class ImplicitSystem {
       b[cloth_.springs[k].b - cloth_.begin] += f;
     }
     if (bending_ > 0) cloth_.bending.add_forces(cloth_.part(points_.start), h, of_points(b));
+    if (cloth_.gas.acts()) cloth_.gas.add_forces(cloth_.part(points_.start), h, of_points(b));
     return b;
   }
 

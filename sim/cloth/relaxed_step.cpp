@@ -88,6 +88,33 @@ class RelaxedBending {
   std::vector<std::size_t> held_;  // pinned points
 };
 
+/// The pressure of gas in a sub-step of step_relaxed(). It is computed in each step of the springs, which
+/// balance most of it.
+class RelaxedGas {
+ public:
+  RelaxedGas(const ClothPoints& points, const ClothRange& cloth, Real h) : cloth_(cloth), h_(h) {
+    if (!cloth.gas.acts()) return;
+    force_.resize(cloth.end - cloth.begin);
+    for (std::size_t i = 0; i < force_.size(); ++i)
+      if (is_held(points, cloth.begin + i)) held_.push_back(i);
+  }
+  /// Adds the effect of the gas in a step to the moves, and its impulses on pinned points to `pin_impulse`.
+  void apply(ClothPoints& points, std::span<Vec4> moves) {
+    if (force_.empty()) return;
+    std::fill(force_.begin(), force_.end(), Vec4::Zero());
+    cloth_.gas.add_forces(cloth_.part(points.start), h_ * h_, force_);
+    for (std::size_t i : held_) points.pin_impulse[cloth_.begin + i] += force_[i];
+    for (std::size_t i = 0; i < force_.size(); ++i)
+      moves[cloth_.begin + i] += points.inverse_mass[cloth_.begin + i] * force_[i];
+  }
+
+ private:
+  const ClothRange& cloth_;
+  Real h_;
+  SpringRun force_;                // times h^2 [kg m]
+  std::vector<std::size_t> held_;  // pinned points
+};
+
 /// The supports of a cloth in a sub-step of step_relaxed().
 class RelaxedSupports {
  public:
@@ -220,6 +247,7 @@ bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& sp
   const bool bends = !cloth.bending.empty(), drags = !cloth.air.empty();
   std::optional<RelaxedBending> bending;
   if (bends) bending.emplace(points, cloth, steps, h);
+  RelaxedGas gas(points, cloth, h);
   RelaxedBendLimit bend_limit(points, cloth);
   if (drags) cloth.air.begin(h);
   springs.begin(points, h);
@@ -242,6 +270,7 @@ bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& sp
   for (uint32_t step = 0; step < steps; ++step) {
     supports.begin_step(step);
     if (bends) bending->apply(points, step, points.moves);
+    gas.apply(points, points.moves);
     springs.apply(points, points.moves);
     for (std::size_t i = 0; drags && i < n; ++i)
       if (!held(i)) moves[i] = velocity[i] + cloth.air.respond(i, moves[i] - velocity[i]);

@@ -216,6 +216,88 @@ TEST_P(StretchedBalloon, StaysRoundAndComesToRest) {
 
 INSTANTIATE_TEST_SUITE_P(Balloons, StretchedBalloon, testing::Values(2, 3));
 
+/// Parameter: longest sub-step of the world [s].
+class GasInSteps : public testing::TestWithParam<Real> {};
+
+TEST_P(GasInSteps, GivesNoEnergyToAPlateThatBouncesOnABalloon) {
+  ClothDef def = effects::sphere_cloth(0.3, 2, {Vec3(0, 0.31, 0)}, effects::find_fabric("balloon")->fabric);
+  def.pressure = 500;
+  def.air.density = 0;
+  World world({.max_step = GetParam()});
+  const ClothHandle cloth = world.add_cloth(def);
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
+  const BodyHandle plate =
+      world.add_body({.shape = Box{{0.6, 0.03, 0.6}}, .pose = {Vec3(0, 0.8, 0)}, .mass = 0.3});
+  world.add_joint({.name = "rail", .type = JointType::prismatic, .a = plate, .axis = Vec3::UnitY()});
+  Real lowest = 0.8, highest = 0;
+  for (int i = 0; i < 300; ++i) {
+    world.step(1.0 / 60);
+    ASSERT_TRUE(world.cloth_report(cloth).finite);
+    const Real height = world.body(plate).pose.position.y();
+    lowest = std::min(lowest, height);
+    if (i >= 120) highest = std::max(highest, height);
+  }
+  EXPECT_LT(lowest, 0.66);  // it bounced
+  EXPECT_NEAR(highest, 0.69, 0.015);
+}
+
+TEST_P(GasInSteps, KeepsAThinSkinUnderHighPressureStill) {
+  // Waves of the length of two edges are the fastest motion of a skin under pressure.
+  ClothDef def = effects::sphere_cloth(0.1, 3, {}, effects::find_fabric("balloon")->fabric);
+  def.pressure = 8440;
+  def.inflate_time = 0.6;
+  def.pins.push_back({.vertex = 0, .position = def.vertices[0]});
+  World world({.max_step = GetParam()});
+  const ClothHandle cloth = world.add_cloth(def);
+  for (int i = 0; i < 75; ++i) world.step(1.0 / 60);
+  Real fastest = 0;
+  for (const Vec3& v : world.cloth(cloth).velocities) fastest = std::max(fastest, v.norm());
+  EXPECT_LT(fastest, 0.6);  // the balloon swings
+}
+
+INSTANTIATE_TEST_SUITE_P(Steps, GasInSteps, testing::Values(1.0 / 60, 1.0 / 240, 1.0 / 960));
+
+/// Parameter: integrator.
+class GasOnAPin : public testing::TestWithParam<ClothIntegrator> {};
+
+TEST_P(GasOnAPin, PushesTheBodyThatHoldsTheSkin) {
+  // Gas pushes a closed skin in all directions equally, so the momentum of skin and body stays zero.
+  ClothDef def = effects::sphere_cloth(0.1, 2, {}, effects::find_fabric("rubber")->fabric);
+  def.integrator = GetParam();
+  if (def.integrator == ClothIntegrator::rk4 || def.integrator == ClothIntegrator::symplectic)
+    def.substep = 0.9 * largest_stable_step(def).step;
+  def.pressure = 1000;
+  def.inflate_time = 0.1;
+  def.air.density = 0;
+  World world({.gravity = Vec3::Zero(), .max_step = 1.0 / 240});
+  const BodyHandle body = world.add_body(
+      {.shape = Box{Vec3::Constant(0.04)}, .pose = {Vec3(0, 0.12, 0)}, .mass = 0.05, .collides = false});
+  for (uint32_t i = 0; i < def.vertices.size(); ++i)
+    if (def.vertices[i].y() > 0.07)
+      def.pins.push_back({.vertex = i, .body = body, .position = def.vertices[i] - Vec3(0, 0.12, 0)});
+  ASSERT_GT(def.pins.size(), 5u);
+  const ClothHandle cloth = world.add_cloth(def);
+  Real greatest = 0;
+  for (int i = 0; i < 60; ++i) {
+    world.step(1.0 / 240);
+    Vec3 momentum = 0.05 * world.body(body).velocity;
+    Real size = momentum.norm();
+    for (std::size_t k = 0; k < def.masses.size(); ++k) {
+      momentum += def.masses[k] * world.cloth(cloth).velocities[k];
+      size += def.masses[k] * world.cloth(cloth).velocities[k].norm();
+    }
+    greatest = std::max(greatest, size);
+    // `implicit` solves its equations to a tolerance.
+    const Real tolerance = def.integrator == ClothIntegrator::implicit ? 5e-6 : 1e-9;
+    EXPECT_LT(momentum.norm(), tolerance * std::max(greatest, 1e-3)) << i;
+  }
+  EXPECT_GT(greatest, 1e-3);
+}
+
+INSTANTIATE_TEST_SUITE_P(Integrators, GasOnAPin,
+                         testing::Values(ClothIntegrator::relaxed, ClothIntegrator::implicit,
+                                         ClothIntegrator::symplectic, ClothIntegrator::rk4));
+
 /// Parameter: number of segments of the cord.
 class ClothCord : public testing::TestWithParam<uint32_t> {};
 
