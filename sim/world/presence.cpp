@@ -55,6 +55,7 @@ void World::Impl::appear(Body& body, Real time) {
   cloth_motion.place_pins(body);
   contacts.add(body);
   wake_overlapped(body, body.pose);
+  wake_at_springs(body);
   if (body.is_dynamic() || body.is_kinematic()) active.add_stepped(body);
   active.note_new_set();
   joint_groups.note_change();
@@ -107,6 +108,16 @@ void World::Impl::wake_overlapped(const Body& body, const Pose& pose) {
   const Aabb box = bounds(body.solid, pose);
   bodies.for_each([&](BodyHandle, const std::unique_ptr<Body>& other) {
     if (other->asleep && bounds(other->solid, other->pose).intersects(box)) active.wake(*other);
+  });
+}
+
+/// Wakes the sleeping bodies that springs connect to a body that appears.
+void World::Impl::wake_at_springs(const Body& body) {
+  springs.for_each([&](SpringHandle, const Spring& s) {
+    for (const auto& [own, other] : {std::pair(&s.def.a, &s.def.b), {&s.def.b, &s.def.a}}) {
+      const auto *at = std::get_if<BodyPoint>(own), *end = std::get_if<BodyPoint>(other);
+      if (at && end && at->body == body.handle && acts(s)) active.wake(*bodies[end->body]);
+    }
   });
 }
 

@@ -43,6 +43,7 @@ struct World::Impl : WorldState {
   void remove_dead_springs();
   void wake_neighbours(Body& body);
   void wake_overlapped(const Body& body, const Pose& pose);
+  void wake_at_springs(const Body& body);
   void wake_at_jumps(Real start, Real end);
 
   // Time is a base plus an integer number of equal sampling times, so that rounding errors do not add up.

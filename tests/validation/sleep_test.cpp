@@ -250,6 +250,37 @@ TEST_P(Sleep, ABodyThatJumpsOrAppearsInItWakesIt) {
     EXPECT_NEAR(world.body(box).centre.y(), 0.13, 1.1e-3) << jumps;
   }
 }
+
+// A spring begins to pull when the body at its other end appears. It moves both ends as it does without sleep.
+TEST_P(Sleep, ABodyThatAppearsAtASpringWakesTheOtherEnd) {
+  for (const MotionType type : {MotionType::static_body, MotionType::kinematic, MotionType::dynamic}) {
+    std::array<Vec3, 2> end[2];
+    for (const bool sleeps : {false, true}) {
+      WorldDef with = def();
+      with.sleep = sleeps;
+      World world(with);
+      world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0});
+      const BodyDef box{.shape = Box{Vec3::Constant(0.4)}, .pose = {Vec3(0, 0.2, 0)}, .restitution = 0};
+      const BodyHandle own = world.add_body(box);
+      BodyDef late = box;
+      late.motion = type;
+      late.pose.position.x() = 2;
+      late.appear_at = 2;
+      const BodyHandle other = world.add_body(late);
+      world.add_spring({.a = BodyPoint{own, Vec3::Zero()},
+                        .b = BodyPoint{other, Vec3::Zero()},
+                        .stiffness = 3000,
+                        .damping = 100,
+                        .rest_length = 0.5});
+      run(world, 1.9);
+      ASSERT_EQ(world.is_asleep(own), sleeps);
+      run(world, 2);
+      end[sleeps] = {world.body(own).centre, world.body(other).centre};
+    }
+    EXPECT_GT(end[0][0].x(), 0.3);
+    for (const std::size_t i : {0, 1}) EXPECT_LT((end[1][i] - end[0][i]).norm(), 1e-3) << i;
+  }
+}
 OFFSTAGE_BOTH_SOLVERS(Solvers, Sleep);
 
 // A box that stands on a face, but not quite flat, falls onto its corners one after the other and stays
