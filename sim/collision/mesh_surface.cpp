@@ -16,6 +16,8 @@ constexpr int kMostSlivers = 16;
 /// A normal outside of a region by less than this sine counts as inside, because normals are not more
 /// accurate.
 constexpr Real kOff = 1e-5;
+/// A direction runs along a triangle if its sine to the triangle's plane is at most this.
+constexpr Real kAlong = 0.01;
 /// Points count as on an edge or a vertex if they are nearer to it than this fraction of the longest edge.
 constexpr Real kOnFeature = 1e-6;
 
@@ -91,6 +93,10 @@ Real SurfaceTriangle::fall(std::size_t k) const {
   return next == kNoFace ? 0 : -normal().dot(inward(mesh->mesh, next, corner(k), corner(k + 1)));
 }
 
+SurfaceTriangle SurfaceTriangle::neighbour(std::size_t k) const {
+  return {mesh, mesh->surface.across(face)[k], side};
+}
+
 bool SurfaceTriangle::edge_allows(std::size_t k, const Vec3& n, Real guard) const {
   const Vec3 &from = corner(k), &to = corner(k + 1);
   const uint32_t next = mesh->surface.across(face)[k];
@@ -123,13 +129,28 @@ bool SurfaceTriangle::vertex_allows(uint32_t vertex, const Vec3& n, Real guard) 
   return true;
 }
 
-bool SurfaceTriangle::allows(const Vec3& point, const Vec3& n, Real guard) const {
-  const Vec3 up = normal();
-  if (n.dot(up) > 0 && n.cross(up).squaredNorm() <= kOff * kOff) return true;
+Real SurfaceTriangle::near2() const {
   Real longest2 = 0;
   for (std::size_t k = 0; k < 3; ++k)
     longest2 = std::max(longest2, (corner(k + 1) - corner(k)).squaredNorm());
-  const Real near2 = kOnFeature * kOnFeature * longest2;
+  return kOnFeature * kOnFeature * longest2;
+}
+
+bool SurfaceTriangle::runs_along_neighbour(const Vec3& point, const Vec3& n) const {
+  for (std::size_t k = 0; k < 3; ++k) {
+    const uint32_t next = mesh->surface.across(face)[k];
+    if (next == kNoFace || std::abs(n.dot(mesh->topology.face_normal(next))) > kAlong) continue;
+    const Vec3 edge = corner(k + 1) - corner(k), arm = point - corner(k);
+    if (edge.cross(arm).squaredNorm() > near2() * edge.squaredNorm()) continue;
+    if (n.dot(inward(mesh->mesh, next, corner(k), corner(k + 1))) > 0) return true;
+  }
+  return false;
+}
+
+bool SurfaceTriangle::allows(const Vec3& point, const Vec3& n, Real guard) const {
+  const Vec3 up = normal();
+  if (n.dot(up) > 0 && n.cross(up).squaredNorm() <= kOff * kOff) return true;
+  const Real near2 = this->near2();
   for (std::size_t k = 0; k < 3; ++k)
     if ((point - corner(k)).squaredNorm() <= near2)
       return vertex_allows(mesh->mesh.triangles[face][k], n, guard);

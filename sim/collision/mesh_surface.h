@@ -47,14 +47,21 @@ struct SurfaceTriangle {
   /// Slope of the neighbouring triangle across the edge (k, k + 1): sine of its angle below this triangle's
   /// plane. Positive at a ridge, negative in a valley, 0 if the surface is flat or ends at the edge.
   Real fall(std::size_t k) const;
+  /// The triangle across the edge (k, k + 1), on the same side. The surface must not end there.
+  SurfaceTriangle neighbour(std::size_t k) const;
   /// Whether a contact at a point of the triangle can push along the unit vector `n` on this side. `guard`, 0
   /// to 1, also allows normals slightly outside of the region of a ridge: by up to this fraction of its
   /// slope.
   bool allows(const Vec3& point, const Vec3& n, Real guard = 0) const;
+  /// Whether the unit vector `n` at a point of the triangle runs along a neighbouring triangle that contains
+  /// this point.
+  bool runs_along_neighbour(const Vec3& point, const Vec3& n) const;
 
  private:
   bool edge_allows(std::size_t k, const Vec3& n, Real guard) const;
   bool vertex_allows(uint32_t vertex, const Vec3& n, Real guard) const;
+  /// Square of the distance within which points count as on an edge or a vertex [m^2].
+  Real near2() const;
 };
 
 }  // namespace offstage::sim

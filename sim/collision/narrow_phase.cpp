@@ -20,6 +20,8 @@ namespace {
 constexpr Real kLeastTriangleDistance = 1e-9;
 /// A PairCache with at most this number of entries is searched linearly.
 constexpr std::size_t kFewEntries = 8;
+/// Greatest number of triangles around a triangle whose sides decide about its side.
+constexpr std::size_t kMostSearched = 12;
 constexpr uint32_t kNoEntry = ~0u;
 
 Pose inverse(const Pose& p) {
@@ -88,12 +90,20 @@ Separation plane_separation(const Convex& a, const Pose& a_from_plane) {
 }
 
 /// Returns the side of a triangle on which a piece is that does not show it. It is the previous side if this
-/// is known, or else the side known for a neighbouring triangle, or else that of the sign of `guess`.
+/// is known, or else the side known for the nearest of kMostSearched triangles around it, or else that of the
+/// sign of `guess`.
 template <class SideOfFace>
 int unseen_side(const SurfaceTriangle& t, Real guess, int before, SideOfFace&& side_of_face) {
   if (before != 0) return before;
-  for (const uint32_t next : t.mesh->surface.across(t.face))
-    if (const int side = next == kNoFace ? 0 : side_of_face(next)) return side;
+  std::array<uint32_t, kMostSearched> searched = {t.face};
+  for (std::size_t done = 0, count = 1; done < count; ++done)
+    for (const uint32_t next : t.mesh->surface.across(searched[done])) {
+      const auto end = searched.begin() + static_cast<std::ptrdiff_t>(count);
+      if (next == kNoFace || count == kMostSearched || std::find(searched.begin(), end, next) != end)
+        continue;
+      if (const int side = side_of_face(next)) return side;
+      searched[count++] = next;
+    }
   return guess >= 0 ? 1 : -1;
 }
 
@@ -102,11 +112,12 @@ int unseen_side(const SurfaceTriangle& t, Real guess, int before, SideOfFace&& s
 /// mesh's frame. Returns the side for the next sub-steps to remember, or 0 if the side is only a guess.
 ///
 /// The direction shows the side if the piece is separate from the triangle and the surface allows a contact
-/// in this direction. There are three exceptions. A piece that is beside the triangle and penetrates the
+/// in this direction. There are four exceptions. A piece that is beside the triangle and penetrates the
 /// surface at another triangle is seen from behind. The foot of a sloping side may come to the border of a
 /// sheet from a flush body and be lower by rounding: within kNearBorder, the piece's centre must therefore be
 /// on the same side. The centre of a long piece may be below the plane of a triangle whose front the piece
-/// approaches from beyond a neighbour; unseen_side() then decides.
+/// approaches from beyond a neighbour. A piece that slides over a surface towards a ridge is exactly behind
+/// the triangle beyond the ridge, and in front of the surface; unseen_side() then decides.
 template <class SideOfFace>
 int set_side(SurfaceTriangle& t, Real distance, const Vec3& outward, const Vec3& point, const Vec3& middle,
              int before, SideOfFace&& side_of_face) {
@@ -114,7 +125,8 @@ int set_side(SurfaceTriangle& t, Real distance, const Vec3& outward, const Vec3&
   const Vec3 front = t.normal();
   const Real lean = outward.dot(front), height = front.dot(middle - t.corner(0));
   const bool is_beside = distance > 0 && std::abs(lean) <= kAlongside;
-  const bool is_clear = distance > kNearBorder || (distance > 0 && lean * height > 0);
+  const bool is_clear = (distance > kNearBorder || (distance > 0 && lean * height > 0)) &&
+                        !t.runs_along_neighbour(point, outward);
   t.side = lean >= 0 ? 1 : -1;
   if (is_clear && !is_beside && t.allows(point, outward)) return t.side;
   t.side = unseen_side(t, is_clear && !is_beside ? lean : height, before, side_of_face);

@@ -13,8 +13,19 @@ namespace {
 /// The normal of a face that approaches a ridge may be outside of the ridge's region by up to this fraction
 /// of the ridge's slope, because the face may turn into the region within the step.
 constexpr Real kGuard = 0.5;
-/// The surface beyond an edge is a valley if it rises there by more than this sine.
+/// The surface beyond an edge is a valley if it rises there by more than this sine, and a ridge if it falls.
 constexpr Real kValley = 1e-3;
+
+/// Greatest depth at which a face pushes a solid, as a multiple of the depth below a neighbouring face or
+/// along another normal that the surface allows.
+constexpr Real kMuchDeeper = 2;
+
+/// Returns the depth of the deepest point [m]; negative if all points are separate, or if there are none.
+Real deepest(const Manifold& m) {
+  Real least = kInfinity;
+  for (uint32_t k = 0; k < m.count; ++k) least = std::min(least, m.points[k].separation);
+  return -least;
+}
 
 /// Returns, by side, the distance by which the other solid may be beyond the triangle's side and still count
 /// as in front of its face. Beyond a valley the plane of the face continues below the surface, which stops
@@ -59,6 +70,27 @@ struct TriangleSide {
     return m.count < count;
   }
 };
+
+/// Returns the greatest depth below its face at which a triangle may push another solid [m]. A body on a
+/// stair is far behind the plane of the riser, but just above the ridge: a solid that is much less deep below
+/// the face beyond a ridge, or along the normals in `found`, has come over an edge of the triangle. `other`:
+/// the solid, with its pose in A's frame.
+Real greatest_depth(const TriangleSide& side, const Convex& other, const Pose& a_from_other,
+                    std::span<const Manifold> found) {
+  Real least = kInfinity;
+  for (const Manifold& m : found)
+    if (m.count > 0) least = std::min(least, deepest(m));
+  const SurfaceTriangle& t = side.triangle;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (!(t.fall(k) > kValley)) continue;
+    const Vec3 up = side.a_from_mesh.vector_to_world(t.neighbour(k).normal());
+    uint32_t start = 0;
+    const Vec3 lowest = a_from_other.point_to_world(other.support(-a_from_other.vector_to_body(up), start));
+    const Vec3 edge = side.a_from_mesh.point_to_world(t.corner(k));
+    least = std::min(least, other.radius - up.dot(lowest - edge));
+  }
+  return kMuchDeeper * std::max(least, 0.0);
+}
 
 }  // namespace
 
@@ -135,8 +167,11 @@ void find_triangle_manifolds(const Convex& a, const Convex& b, const PairTriangl
     for (std::size_t k = before; k < found.size(); ++k) restricted |= side.restrict(found[k]);
     if (!restricted) continue;
     const Vec3 up = side.a_from_mesh.vector_to_world(side.triangle.normal());
-    found.push_back(
-        triangle_face_manifold(a, b, a_from_b, side.of_b, up, room_beyond(side.triangle, margin), margin));
+    const Real most = side.of_b ? greatest_depth(side, a, Pose{}, std::span(found).subspan(before))
+                                : greatest_depth(side, b, a_from_b, std::span(found).subspan(before));
+    const Manifold face =
+        triangle_face_manifold(a, b, a_from_b, side.of_b, up, room_beyond(side.triangle, margin), margin);
+    if (deepest(face) <= most + kRim * margin) found.push_back(face);
   }
   found.erase(std::remove_if(found.begin() + static_cast<std::ptrdiff_t>(before), found.end(),
                              [](const Manifold& m) { return m.count == 0; }),

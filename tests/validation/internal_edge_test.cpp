@@ -815,6 +815,54 @@ TEST_P(Sheets, KeepFallingRodsOnTheirSide) {
   }
 }
 
+/// Returns a sheet with one step at x = 0, which falls by `drop` over the length `run`.
+TriangleMesh step_sheet(Real drop, Real run) {
+  TriangleMesh m;
+  const std::array<Vec3, 4> profile = {Vec3(-3, 0, 0), Vec3(0, 0, 0), Vec3(run, -drop, 0), Vec3(4, -drop, 0)};
+  for (const Vec3& p : profile)
+    for (const Real z : {-2.0, 2.0}) m.vertices.emplace_back(p.x(), p.y(), z);
+  for (uint32_t i = 0; i < 6; i += 2) {
+    m.triangles.push_back({i, i + 1, i + 3});
+    m.triangles.push_back({i, i + 3, i + 2});
+  }
+  return m;
+}
+
+// A body on the upper level is far behind the plane of the riser, which must not push it.
+TEST_P(Sheets, LetBodiesSlideOffAStep) {
+  const Mover movers[] = {{"box", Box{{0.4, 0.3, 0.5}}, 0.15},
+                          {"flat box", Box{{0.4, 0.05, 0.5}}, 0.025},
+                          {"disc", Cylinder{0.2, 0.3}, 0.15}};
+  for (const Mover& mover : movers)
+    for (const Real drop : {0.003, 0.03, 0.2})
+      for (const Real slope : {90.0, 85.0, 60.0})
+        for (const Real step : {1.0 / 240, 1.0 / 60}) {
+          const Real run_out = slope == 90 ? 0 : drop / std::tan(slope * std::numbers::pi / 180);
+          World world(def(step));
+          world.add_body(fixed_body(MeshShape{world.add_mesh(step_sheet(drop, run_out))}, Vec3::Zero(), 0));
+          const BodyHandle body = world.add_body(moving_body(mover, 3, 0));
+          const Real deepest = run(world, 0.7, step).penetration;
+          const std::string about = std::string(mover.name) + ", drop " + std::to_string(drop) + ", slope " +
+                                    std::to_string(slope) + ", step " + std::to_string(step);
+          EXPECT_LT(deepest, 2e-3) << about;
+          const Real fallen = std::sqrt(2 * kFallAcceleration * drop);
+          EXPECT_NEAR(world.body(body).velocity.x(), 3, 0.02 + 0.6 * fallen * (slope < 90)) << about;
+        }
+}
+
+TEST_P(Sheets, HoldBodiesOnTheEdgeOfAStep) {
+  for (const Real drop : {0.003, 0.03, 0.2})
+    for (const Real inside : {0.05, 0.1}) {
+      World world(def());
+      world.add_body(fixed_body(MeshShape{world.add_mesh(step_sheet(drop, 0))}, Vec3::Zero(), 0.5));
+      BodyDef box = fixed_body(Box{{0.4, 0.3, 0.5}}, {-inside, 0.16, 0.1}, 0.5);
+      box.motion = MotionType::dynamic;
+      const BodyHandle body = world.add_body(box);
+      EXPECT_LT(run(world, 1).penetration, 1e-3) << drop;
+      EXPECT_LT((world.body(body).centre - Vec3(-inside, 0.15, 0.1)).norm(), 1e-3) << drop;
+    }
+}
+
 OFFSTAGE_BOTH_SOLVERS(Solvers, Sheets);
 
 }  // namespace
