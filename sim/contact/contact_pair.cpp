@@ -47,6 +47,16 @@ bool is_narrow(const Manifold& m) {
   return area <= kNarrow * std::sqrt(longest2);
 }
 
+Manifold near_deepest(const Manifold& m) {
+  Real least = std::numeric_limits<Real>::infinity();
+  for (uint32_t k = 0; k < m.count; ++k) least = std::min(least, m.points[k].separation);
+  Manifold near = m;
+  near.count = 0;
+  for (uint32_t k = 0; k < m.count; ++k)
+    if (m.points[k].separation <= least + kInclined) near.points[near.count++] = m.points[k];
+  return near;
+}
+
 ContactPair::ContactPair(Body& a, Body& b, const PairSurface& surface)
     : a_(&a),
       b_(&b),
@@ -69,7 +79,8 @@ void ContactPair::find(const Pose& a, const Pose& b, Real margin, Real reuse_wit
     // Edges of a face have no effect on a ball that lies on the face.
     const bool on_face = (m.manifold.source == NormalSource::face_of_b && is_ball(*a_)) ||
                          (m.manifold.source == NormalSource::face_of_a && is_ball(*b_));
-    has_narrow_ |= !on_face && !(m.manifold.continues_a && m.manifold.continues_b) && is_narrow(m.manifold);
+    has_narrow_ |= !on_face && !(m.manifold.continues_a && m.manifold.continues_b) &&
+                   is_narrow(near_deepest(m.manifold));
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
       const Real separation = m.manifold.points[k].separation;
       separation_ = std::min(separation_, separation);

@@ -69,6 +69,10 @@ constexpr Real kTouching = 2e-5;
 
 /// Whether all points of a manifold are near one line.
 bool is_narrow(const Manifold& m);
+/// Two points of a face that lies on another face differ less than this in depth [m].
+constexpr Real kInclined = 1e-3;
+/// Returns a manifold without the points that are less deep than the deepest one by more than kInclined.
+Manifold near_deepest(const Manifold& m);
 
 /// Two bodies near each other, and their contacts. Members that are read in loops over all pairs come first,
 /// in one cache line.
@@ -159,8 +163,8 @@ class alignas(64) ContactPair {
     if (!placed_.empty()) sim::prefetch(placed_.data(), placed_.data() + 1);
   }
 
-  /// Whether a manifold touches along a line or at a point (is_narrow()). It may then lie at an internal
-  /// edge.
+  /// Whether a manifold touches along a line or at a point with the points near its deepest one
+  /// (is_narrow()). It may then lie at an internal edge.
   bool has_narrow() const { return has_narrow_; }
   /// The i-th manifold added by add_speculative_contacts(), with its points at their positions at the
   /// interval's end.

@@ -31,8 +31,6 @@ constexpr std::size_t kMostContacts = 512;
 /// Lateral distance at which the surface is sampled, as a multiple of the greatest flush step. With
 /// kLookOver, the direction from an edge to the sample is at 18 degrees to the normal.
 constexpr Real kLookBeside = 1;
-/// Two points of a face of X that lies on a face of Y differ less than this in depth [m].
-constexpr Real kInclined = 1e-3;
 /// Greatest overlap that counts as prevented [m].
 constexpr Real kPrevented = 2e-4;
 /// Contacts with a slope are searched within this distance beyond the contact that they replace [m].
@@ -103,19 +101,12 @@ struct View {
   bool is_face_of_x() const {
     return m->source == (x_is_a ? NormalSource::face_of_a : NormalSource::face_of_b);
   }
-  /// Returns the manifold without points that are much less deep than the deepest. If a face of X that gives
-  /// the normal is inclined over a face of Y, only an edge or a corner of Y may touch it.
-  Manifold near_deepest() const {
-    Manifold near = *m;
-    near.count = 0;
-    for (uint32_t k = 0; k < m->count; ++k)
-      if (m->points[k].separation <= separation() + kInclined) near.points[near.count++] = m->points[k];
-    return near;
-  }
   /// Whether the contact touches along a line or at a point, as a contact at an internal edge does.
   bool may_be_at_internal_edge() const {
     if (continues() || y().collision_shape().is_plane()) return false;
-    if (!(is_face_of_x() ? is_narrow(near_deepest()) : is_narrow(*m))) return false;
+    // If a face of X that gives the normal is inclined over a face of Y, only an edge or a corner of Y may
+    // touch it.
+    if (!is_narrow(is_face_of_x() ? near_deepest(*m) : *m)) return false;
     return !is_face() || !std::holds_alternative<Sphere>(x().def.shape);
   }
 };
@@ -162,6 +153,10 @@ class BodyContacts {
       }
       const auto face = std::find_if(faces_.begin(), faces_.end(),
                                      [&](const View* f) { return keeps_apart(*f, views_[i]); });
+      if (std::ranges::any_of(faces_, [&](const View* f) { return passes_over(*f, views_[i]); })) {
+        verdicts.push_back({views_[i].pair, views_[i].index, {}});
+        continue;
+      }
       if (face != faces_.end()) {
         verdicts.push_back({views_[i].pair, views_[i].index, {}});
         if (!views_[i].speculative) verdicts.back().instead = upright(views_[i], **face);
@@ -302,7 +297,7 @@ class BodyContacts {
     const Vec3 over_top = top + std::max(0.0, up.dot(on_face - top)) * up + over;
     const Vec3 own = distance(v, top_piece, over_top).normal;
     if (own.dot(n) > kSameDirection) return std::nullopt;
-    if (own.dot(up) > kGoesOn) return is_flat(v, over_top, up, across) ? std::optional(up) : std::nullopt;
+    if (own.dot(up) > kGoesOn) return up;
     const bool is_slope = own.dot(up) > 0 && own.dot(n) > 0 && own.dot(n) < kOwnNormal;
     return is_slope && is_ramp(v, top, up, across) ? std::optional(own) : std::nullopt;
   }
@@ -314,8 +309,21 @@ class BodyContacts {
     if (face.x_piece == v.x_piece || v.normal.dot(face.normal) > kGoesOn ||
         v.y().collision_shape().is_plane())
       return false;
+    return face.normal.dot(v.on_x(0) - face.on_y(face.deepest)) >= -flush_ && separates(face, v);
+  }
+
+  /// Whether a piece of X that lies on a face passes over a piece of Y, which it does not touch yet. The
+  /// linearised contact with an edge in front of X, slightly below the face, would stop X before it is there.
+  bool passes_over(const View& face, const View& v) const {
+    if (face.x_piece != v.x_piece || (v.pair == face.pair && v.y_piece == face.y_piece)) return false;
+    if (v.normal.dot(face.normal) > kOwnNormal || v.y().collision_shape().is_plane()) return false;
+    return (v.speculative || v.separation() > 0) && separates(face, v);
+  }
+
+  /// Whether the plane of a face on which X lies separates the two pieces of a contact throughout the
+  /// interval.
+  bool separates(const View& face, const View& v) const {
     const uint32_t deepest = face.deepest;
-    if (face.normal.dot(v.on_x(0) - face.on_y(deepest)) < -flush_) return false;
     const Vec3 up = pose(face.y(), false).vector_to_body(face.normal),
                on_face = pose(face.y(), false).point_to_body(face.on_y(deepest)),
                lying = pose(x_, false).point_to_body(face.on_x(deepest));

@@ -535,6 +535,43 @@ TEST_P(InternalEdges, DoNotStopBodiesOnAConveyor) {
 
 // Two inclined planes of many triangles meet at the bottom: a body that touches both slides along the line
 // where they meet.
+// The top edge of a ramp is that of the level box before it, or lies just beyond and below it. Its end face
+// is inside the level box, or behind its edge.
+TEST_P(InternalEdges, DoNotStopBodiesAtACrest) {
+  for (const Real slope : {3.0, 15.0})
+    for (const Real gap : {0.0, 0.01})
+      for (const Real step : {1.0 / 240, 1.0 / 60})
+        for (const Real speed : {1.3, 3.0, 7.0}) {
+          const Real angle = slope * std::numbers::pi / 180;
+          const Quat turn(Eigen::AngleAxisd(-angle, Vec3::UnitZ()));
+          World world(def(step));
+          world.add_body(fixed_body(Box{{4, 0.5, 3}}, {-2, -0.25, 0}, 0));
+          BodyDef ramp = fixed_body(Box{{8, 0.5, 3}}, Vec3::Zero(), 0);
+          ramp.pose = {turn * Vec3(4, -0.25, 0) + gap * Vec3(1, -std::tan(angle), 0), turn};
+          world.add_body(ramp);
+          const BodyHandle body = world.add_body(moving_body({"box", Box{{0.4, 0.3, 0.5}}, 0.15}, speed, 0));
+          run(world, 1.5 / speed + 0.3, step);
+          const Motion end = world.body_motion(body, world.time());
+          EXPECT_GT(end.pose.position.x(), 0.3) << slope << " " << gap << " " << step << " " << speed;
+          EXPECT_GT(end.velocity.x(), 0.999 * speed) << slope << " " << gap << " " << step << " " << speed;
+        }
+}
+
+// A body that slides on to a lower tile is above this tile's edge when it comes to it.
+TEST_P(InternalEdges, DoNotStopBodiesAboveALowerTile) {
+  for (const Real drop : {1e-3, 3e-3, 0.01})
+    for (const Real step : {1.0 / 240, 1.0 / 60})
+      for (const Real speed : {1.0, 3.0, 6.0}) {
+        World world(def(step));
+        world.add_body(fixed_body(Box{{4, 0.5, 3}}, {-2, -0.25, 0}, 0));
+        world.add_body(fixed_body(Box{{8, 0.5, 3}}, {4, -0.25 - drop, 0}, 0));
+        const BodyHandle body = world.add_body(moving_body({"box", Box{{0.4, 0.3, 0.5}}, 0.15}, speed, 0));
+        run(world, 1.5 / speed + 0.3, step);
+        EXPECT_NEAR(world.body(body).velocity.x(), speed, 0.03) << drop << " " << step << " " << speed;
+        EXPECT_NEAR(world.body(body).centre.y(), 0.15 - drop, 2e-3) << drop << " " << step << " " << speed;
+      }
+}
+
 TEST_P(InternalEdges, OfAValleyDoNotStopBodiesSlidingAlongIt) {
   const Real slope = std::tan(0.5), radius = 0.1;
   const Mover movers[] = {{"ball", Sphere{radius}, radius / std::cos(0.5)},
