@@ -34,7 +34,7 @@ bool ParticleMotion::step(Real start, Real h, const CoupledSystem& coupled,
   for (const auto& articulation : world_.articulations) articulation->begin_impulses(start + h);
   impulses_.begin(joints_.links(), std::move(expected));
   events_.clear();
-  gather_cloths();
+  gather_cloths(h);
   const ParticleStage stage{start,     h,      obstacles_.fixed(), obstacles_.moving(), world_.def.bounds,
                             impulses_, cloths_};
   report.solvers.particle_lcp.add(collide(stage, coupled));
@@ -80,23 +80,33 @@ Aabb ParticleMotion::colliding_bounds(Real h) const {
 }
 
 /// Collects the cloths with which particles collide. While particles are prewarmed, cloths stand still.
-void ParticleMotion::gather_cloths() {
-  cloths_.clear();
+void ParticleMotion::gather_cloths(Real h) {
+  cloths_.clear(impulses_);
   bool wanted = false;
   world_.systems.for_each([&](ParticleSystemHandle, const ParticleSystem& s) {
     wanted |= s.def.collides && s.arrays.size() > 0;
   });
   if (!wanted) return;
   std::vector<Real> inverse_masses;
+  std::vector<ClothObstacles::Pin> held;
+  std::map<uint32_t, uint32_t> holders;  // by slot
   world_.cloths.for_each([&](ClothHandle, const std::unique_ptr<Cloth>& cloth) {
     if (cloth->absent || !cloth->def.collides) return;
     inverse_masses.assign(cloth->points.size(), 0);
+    held.clear();
     const bool moves = !cloth->stopped && !is_prewarming_;
     for (std::size_t i = 0; moves && i < cloth->points.size(); ++i) inverse_masses[i] = 1 / cloth->masses[i];
-    for (const ClothPin& pin : cloth->pins) inverse_masses[pin.vertex] = 0;
+    for (const ClothPin& pin : cloth->pins) {
+      inverse_masses[pin.vertex] = 0;
+      const std::unique_ptr<Body>* body = world_.bodies.find(pin.body);
+      if (!moves || !body || (*body)->absent || !(*body)->is_dynamic()) continue;
+      const auto [holder, is_new] = holders.try_emplace(pin.body.index, 0);
+      if (is_new) holder->second = cloths_.add_holder(swept_obstacle(**body, h));
+      held.push_back({pin.vertex, holder->second, (*body)->asleep ? 0 : cloth->masses[pin.vertex]});
+    }
     const std::vector<Vec3>& before = moves ? cloth->before : cloth->points;
     cloths_.add(before, cloth->points, cloth->velocities, inverse_masses, cloth->triangles,
-                cloth->def.friction);
+                cloth->def.friction, held);
   });
   cloths_.build();
 }
@@ -104,6 +114,7 @@ void ParticleMotion::gather_cloths() {
 /// Changes the velocities of the cloths by the impulses of particles.
 void ParticleMotion::return_cloths() {
   if (cloths_.empty() || is_prewarming_) return;
+  cloths_.finish();
   std::size_t k = 0;
   world_.cloths.for_each([&](ClothHandle, const std::unique_ptr<Cloth>& cloth) {
     if (cloth->absent || !cloth->def.collides) return;

@@ -40,7 +40,7 @@ class ParticleMotion {
   bool waits(ParticleSystemHandle system) const;
   ContactWork collide(const ParticleStage& stage, const CoupledSystem& coupled);
   void add(std::vector<ParticleEvent>& events);
-  void gather_cloths();
+  void gather_cloths(Real h);
   void return_cloths();
 
   WorldState& world_;
