@@ -37,20 +37,20 @@ Wrench BodyImpulses::expected(uint32_t body) const {
   return found == expected_.end() ? Wrench{} : found->second.expected;
 }
 
-Vec3 BodyImpulses::velocity(const Obstacle& o, const Vec3& arm) const {
-  Vec3 velocity = o.end_velocity, spin = o.end_spin;
+Vec6 BodyImpulses::gained(const Obstacle& o) const {
   if (const Link at = link(o.body); at.bodies) {
-    if (const auto known = gained_.find(at.bodies); known != gained_.end()) {
-      velocity += known->second[at.index].head<3>();
-      spin += known->second[at.index].tail<3>();
-    }
-  } else if (const auto sum = sums_.find(o.body); sum != sums_.end()) {
-    const Vec6 impulse = stacked(sum->second.impulse, sum->second.angular_impulse);
-    const Vec6 gained = mobility(o, impulse) * impulse;
-    velocity += gained.head<3>();
-    spin += gained.tail<3>();
+    const auto known = gained_.find(at.bodies);
+    return known == gained_.end() ? Vec6(Vec6::Zero()) : known->second[at.index];
   }
-  return velocity + spin.cross(arm);
+  const auto sum = sums_.find(o.body);
+  if (sum == sums_.end()) return Vec6::Zero();
+  const Vec6 impulse = stacked(sum->second.impulse, sum->second.angular_impulse);
+  return mobility(o, impulse) * impulse;
+}
+
+Vec3 BodyImpulses::velocity(const Obstacle& o, const Vec3& arm) const {
+  const Vec6 more = gained(o);
+  return o.end_velocity + more.head<3>() + (o.end_spin + more.tail<3>()).cross(arm);
 }
 
 void BodyImpulses::push(const Reaction& reaction) {

@@ -61,6 +61,8 @@ class BodyImpulses {
   Mat6 mobility(const Obstacle& o, const Vec6& push) const;
   /// The expected impulse on a body; zero if there is none.
   Wrench expected(uint32_t body) const;
+  /// Change of the velocity and the angular velocity of a dynamic body by the impulses so far.
+  Vec6 gained(const Obstacle& o) const;
   /// Velocity of the point at `arm` from the centre of mass, after the impulses so far [m/s].
   Vec3 velocity(const Obstacle& o, const Vec3& arm) const;
   void push(const Reaction& reaction);

@@ -4,8 +4,10 @@
 #include <cmath>
 #include <limits>
 
+#include "sim/contact/collision.h"
 #include "sim/geometry/closest_points.h"
 #include "sim/geometry/intersection.h"
+#include "sim/linear/rigid_mobility.h"
 #include "sim/particles/particles.h"
 
 namespace offstage::sim {
@@ -26,23 +28,38 @@ Vec3 normal_of(const Vec3& a, const Vec3& b, const Vec3& c) {
 
 }  // namespace
 
-void ClothObstacles::clear() {
+void ClothObstacles::clear(BodyImpulses& impulses) {
+  impulses_ = &impulses;
   from_.clear();
   to_.clear();
   velocity_.clear();
   inverse_mass_.clear();
+  holder_.clear();
+  holders_.clear();
   triangles_.clear();
   cloths_.clear();
 }
 
+uint32_t ClothObstacles::add_holder(const Obstacle& body) {
+  holders_.push_back({body});
+  return static_cast<uint32_t>(holders_.size() - 1);
+}
+
 void ClothObstacles::add(std::span<const Vec3> from, std::span<const Vec3> to,
                          std::span<const Vec3> velocities, std::span<const Real> inverse_masses,
-                         std::span<const Triangle> triangles, Real friction) {
+                         std::span<const Triangle> triangles, Real friction, std::span<const Pin> pins) {
   const auto first = static_cast<uint32_t>(from_.size()), cloth = static_cast<uint32_t>(cloths_.size());
   from_.insert(from_.end(), from.begin(), from.end());
   to_.insert(to_.end(), to.begin(), to.end());
   velocity_.insert(velocity_.end(), velocities.begin(), velocities.end());
   inverse_mass_.insert(inverse_mass_.end(), inverse_masses.begin(), inverse_masses.end());
+  holder_.resize(from_.size(), kNone);
+  for (const Pin& pin : pins) {
+    Holder& holder = holders_[pin.holder];
+    holder_[first + pin.point] = pin.holder;
+    const PointVelocity E = point_velocity(to[pin.point] - holder.body.centre_at(1));
+    holder.carried += pin.mass * E.transpose() * E;
+  }
   for (const Triangle& t : triangles)
     triangles_.push_back({{t[0] + first, t[1] + first, t[2] + first}, cloth});
   cloths_.push_back({first, friction});
@@ -161,14 +178,33 @@ Vec3 ClothObstacles::carried(const Hit& hit) const {
   return hit.position - hit.distance * hit.normal + displacement(hit) + hit.distance * (turn * hit.normal);
 }
 
+template <class F>
+void ClothObstacles::for_each_holder(const Hit& hit, F&& f) const {
+  if (holders_.empty()) return;
+  const Triangle& corners = triangles_[hit.triangle].corners;
+  const auto holder = [&](std::size_t k) { return holder_[corners[k]]; };
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (holder(k) == kNone || (k > 0 && holder(k) == holder(0)) || (k == 2 && holder(k) == holder(1)))
+      continue;
+    const Vec3 centre = holders_[holder(k)].body.centre_at(hit.fraction);
+    PointVelocity at = PointVelocity::Zero();
+    for (std::size_t i = k; i < 3; ++i)
+      if (holder(i) == holder(k))
+        at += hit.weights[static_cast<Eigen::Index>(i)] *
+              point_velocity(corner(corners[i], hit.fraction) - centre);
+    f(Share{holder(k), at});
+  }
+}
+
 Vec3 ClothObstacles::velocity(const Hit& hit) const {
   Vec3 sum = Vec3::Zero();
   for (std::size_t k = 0; k < 3; ++k)
     sum += hit.weights[static_cast<Eigen::Index>(k)] * velocity_[triangles_[hit.triangle].corners[k]];
+  for_each_holder(hit, [&](const Share& s) { sum += s.at * impulses_->gained(holders_[s.holder].body); });
   return sum;
 }
 
-Real ClothObstacles::mobility(const Hit& hit) const {
+Real ClothObstacles::mobility_of_free_corners(const Hit& hit) const {
   Real sum = 0;
   for (std::size_t k = 0; k < 3; ++k) {
     const Real weight = hit.weights[static_cast<Eigen::Index>(k)];
@@ -177,17 +213,41 @@ Real ClothObstacles::mobility(const Hit& hit) const {
   return sum;
 }
 
+bool ClothObstacles::is_held(const Hit& hit) const {
+  return std::ranges::any_of(triangles_[hit.triangle].corners,
+                             [&](uint32_t point) { return holder_[point] != kNone; });
+}
+
+/// The holder carries the mass of all its points.
+Mat6 ClothObstacles::holder_mobility(const Holder& holder, const Vec6& push) const {
+  const Mat6 own = impulses_->mobility(holder.body, push);
+  return (Mat6::Identity() + own * holder.carried).partialPivLu().solve(own);
+}
+
+Vec3 ClothObstacles::impulse(const Hit& hit, const Vec3& u, const Collider& particle) const {
+  const Real friction = std::sqrt(particle.friction * cloths_[triangles_[hit.triangle].cloth].friction);
+  const Real free = 1 / particle.mass + mobility_of_free_corners(hit);
+  if (!is_held(hit)) return collision_impulse(1 / free, u, hit.normal, particle.restitution, friction);
+  Mat3 K = free * Mat3::Identity();
+  for_each_holder(hit, [&](const Share& s) {
+    K += s.at * holder_mobility(holders_[s.holder], Vec6(-s.at.transpose() * hit.normal)) * s.at.transpose();
+  });
+  const ContactFrame f = contact_frame(hit.normal);
+  Mat3 axes;
+  axes << f.n, f.t, f.k;
+  return axes * collision_impulse(Mat3(axes.transpose() * K * axes), Vec3(axes.transpose() * u),
+                                  particle.restitution, friction, friction);
+}
+
 ClothObstacles::Impact ClothObstacles::collide(const Hit& hit, const Vec3& v, const Collider& particle,
                                                Real gain) {
-  Sheet& cloth = cloths_[triangles_[hit.triangle].cloth];
   const Vec3 u = v - velocity(hit);
   const Real approach = -u.dot(hit.normal);
   const Real restitution = 2 * particle.restitution * approach < gain ? 0 : particle.restitution;
   Impact impact{.strikes = approach > std::max(gain, 0.0), .bounces = restitution > 0};
-  cloth.hits += impact.strikes;
+  cloths_[triangles_[hit.triangle].cloth].hits += impact.strikes;
   if (!(approach > 0)) return impact;
-  impact.impulse = collision_impulse(1 / (1 / particle.mass + mobility(hit)), u, hit.normal, restitution,
-                                     std::sqrt(particle.friction * cloth.friction));
+  impact.impulse = impulse(hit, u, {particle.mass, restitution, particle.friction});
   push(hit, -impact.impulse);
   return impact;
 }
@@ -196,6 +256,21 @@ void ClothObstacles::push(const Hit& hit, const Vec3& impulse) {
   for (std::size_t k = 0; k < 3; ++k) {
     const uint32_t point = triangles_[hit.triangle].corners[k];
     velocity_[point] += hit.weights[static_cast<Eigen::Index>(k)] * inverse_mass_[point] * impulse;
+  }
+  for_each_holder(hit, [&](const Share& s) {
+    Holder& holder = holders_[s.holder];
+    const Vec6 all = s.at.transpose() * impulse, change = holder_mobility(holder, all) * all;
+    const Vec6 own = all - holder.carried * change;
+    if (!holder.carried.isZero(0)) holder.gained += change;
+    impulses_->push({holder.body.body, own.head<3>(), own.tail<3>()});
+  });
+}
+
+void ClothObstacles::finish() {
+  for (std::size_t i = 0; i < holder_.size(); ++i) {
+    if (holder_[i] == kNone) continue;
+    const Holder& holder = holders_[holder_[i]];
+    velocity_[i] += point_velocity(to_[i] - holder.body.centre_at(1)) * holder.gained;
   }
 }
 

@@ -1,7 +1,8 @@
 #pragma once
 /// The cloths with which particles collide during one sub-step (physics F9). The corners of a triangle move
 /// straight from their positions at the start of the sub-step to those at its end. Impulses of particles
-/// change the velocities of the corners, which move with them from the next sub-step on.
+/// change the velocities of the corners, which move with them from the next sub-step on. Corners that are
+/// pinned to a dynamic body pass impulses on to this body and its joints.
 
 #include <cstdint>
 #include <optional>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "sim/collision/bounding_tree.h"
+#include "sim/dynamics/body_impulses.h"
 
 namespace offstage::sim {
 
@@ -24,12 +26,23 @@ class ClothObstacles {
     Vec3 weights;   ///< barycentric coordinates of the nearest point
   };
 
-  /// Removes all cloths.
-  void clear();
+  /// A point of a cloth that is pinned to a dynamic body.
+  struct Pin {
+    uint32_t point;   ///< its index in the cloth
+    uint32_t holder;  ///< number of the body, from add_holder()
+    Real mass;        ///< mass of the point that moves with the body [kg]; 0 if the body sleeps
+  };
+
+  /// Removes all cloths and holders. Impulses on the bodies that hold cloth will be added to `impulses`.
+  void clear(BodyImpulses& impulses);
+  /// Adds a dynamic body that holds points of cloths. Returns its number.
+  uint32_t add_holder(const Obstacle& body);
   /// Adds a cloth. `from` and `to`: positions of its points at the start and the end of the sub-step [m];
-  /// `velocities` at the end [m/s]; `inverse_masses` [1/kg], 0 for points that particles do not move.
+  /// `velocities` at the end [m/s]; `inverse_masses` [1/kg], 0 for pinned points and for points that
+  /// particles do not move.
   void add(std::span<const Vec3> from, std::span<const Vec3> to, std::span<const Vec3> velocities,
-           std::span<const Real> inverse_masses, std::span<const Triangle> triangles, Real friction);
+           std::span<const Real> inverse_masses, std::span<const Triangle> triangles, Real friction,
+           std::span<const Pin> pins = {});
   /// Prepares the search, after all cloths have been added.
   void build();
   bool empty() const { return triangles_.empty(); }
@@ -67,12 +80,14 @@ class ClothObstacles {
 
   /// Velocity of the point that was hit at the end of the sub-step, with all impulses so far [m/s].
   Vec3 velocity(const Hit& hit) const;
-  /// Change of velocity() per unit of impulse [1/kg].
-  Real mobility(const Hit& hit) const;
-  Real friction(const Hit& hit) const { return cloths_[triangles_[hit.triangle].cloth].friction; }
+  /// Returns the impulse on a particle [N s] that collides with the cloth at the relative velocity `u`, which
+  /// approaches [m/s].
+  Vec3 impulse(const Hit& hit, const Vec3& u, const Collider& particle) const;
   /// Applies an impulse to the cloth at the point that was hit [N s].
   void push(const Hit& hit, const Vec3& impulse);
 
+  /// Changes the velocities of pinned points by the impulses on their holders. Call it after all collisions.
+  void finish();
   /// Velocities of a cloth's points with all impulses, and its number of collisions, in the order of add().
   std::span<const Vec3> velocities(std::size_t cloth) const;
   uint64_t hits(std::size_t cloth) const { return cloths_[cloth].hits; }
@@ -100,8 +115,33 @@ class ClothObstacles {
   }
   std::optional<Hit> hit(uint32_t triangle, const Path& path, Real latest) const;
 
+  /// A dynamic body that holds points.
+  struct Holder {
+    Obstacle body;
+    Mat6 carried = Mat6::Zero();  // mass matrix of the points about its centre of mass
+    Vec6 gained = Vec6::Zero();   // change of its velocity by hits on its points
+  };
+  static constexpr uint32_t kNone = ~0u;
+  using PointVelocity = Eigen::Matrix<Real, 3, 6>;
+  /// The part of a holder in a hit: the velocity of the point that was hit is `at` times that of the holder,
+  /// plus the velocities of other corners.
+  struct Share {
+    uint32_t holder;
+    PointVelocity at;
+  };
+  /// Calls f(share) for each holder of the corners of the triangle that was hit.
+  template <class F>
+  void for_each_holder(const Hit& hit, F&& f) const;
+  /// Mobility of a holder and its points for an impulse roughly in this direction.
+  Mat6 holder_mobility(const Holder& holder, const Vec6& push) const;
+  Real mobility_of_free_corners(const Hit& hit) const;
+  bool is_held(const Hit& hit) const;
+
   std::vector<Vec3> from_, to_, velocity_;
   std::vector<Real> inverse_mass_;
+  std::vector<uint32_t> holder_;  // by point: number of the dynamic body that holds it, or kNone
+  std::vector<Holder> holders_;
+  BodyImpulses* impulses_ = nullptr;
   std::vector<ClothTriangle> triangles_;
   std::vector<ClothTriangle> in_tree_;  // the triangles for which the tree was built
   std::vector<Sheet> cloths_;

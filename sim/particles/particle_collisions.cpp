@@ -97,7 +97,11 @@ void ParticleCollisions::gather(const ParticleStage& stage) {
     const auto count = static_cast<uint32_t>(systems_[s]->arrays.size());
     outcomes_[s].touched.assign(count, 0);
     outcomes_[s].trapped.assign(count, 0);
-    for (uint32_t i = 0; i < count; ++i) sources_.push_back({s, i, false});
+    if (systems_[s]->hits_particles()) {
+      for (uint32_t i = 0; i < count; ++i) sources_.push_back({s, i, false});
+    } else {
+      for (const uint32_t i : systems_[s]->on_bodies()) sources_.push_back({s, i, false});
+    }
   }
   const std::size_t n = sources_.size();
   unsorted_.resize(n);

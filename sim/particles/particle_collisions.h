@@ -22,8 +22,9 @@ class ParticleCollisions {
     ParticleTally tally;  ///< figures of the system; only those about collisions are set
   };
 
-  /// Moves particles to the end of the sub-step and resolves their collisions. ParticleSystem::fly_all() must
-  /// have been called for each system. The systems must be in the order of their handles. `lcp_cluster`: see
+  /// Moves particles to the end of the sub-step and resolves their collisions: all particles of systems that
+  /// collide with particles, and those on bodies of other systems. ParticleSystem::fly_all() must have been
+  /// called for each system. The systems must be in the order of their handles. `lcp_cluster`: see
   /// ParticleContacts::solve().
   void step(std::span<ParticleSystem* const> systems, const ParticleStage& stage, ImpactLaw law,
             Real collision_speed, uint32_t lcp_cluster = 0);

@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <limits>
 #include <map>
-#include <numeric>
 
 #include <oneapi/tbb/parallel_for.h>
 
 namespace offstage::sim {
 void ParticleSearch::build(std::span<const CollidingParticle> particles, Real h, Real margin) {
-  all_.resize(particles.size());
-  std::iota(all_.begin(), all_.end(), 0u);
+  all_.clear();
+  for (uint32_t i = 0; i < particles.size(); ++i)
+    if (particles[i].internal || particles[i].external) all_.push_back(i);
   build(particles, all_, h, margin);
 }
 

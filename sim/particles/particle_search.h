@@ -42,6 +42,7 @@ class ParticleSearch {
   void list_partners(std::span<const CollidingParticle> particles, std::span<const uint8_t> chosen);
   std::span<const uint32_t> partners(uint32_t i) const {
     const List& list = lists_[i];
+    if (list.count == 0) return {};
     return std::span(partners_[list.chunk]).subspan(list.first, list.count);
   }
 

@@ -306,8 +306,7 @@ bool ParticleSweep::press_cloth(ClothContact& contact, Vec3& v, Real mass, Real 
   const ClothObstacles::Hit& hit = contact.hit;
   const Vec3 u = v - cloths_->velocity(hit);
   if (!contact.presses || u.dot(hit.normal) >= 0) return false;
-  const Vec3 impulse = collision_impulse(1 / (1 / mass + cloths_->mobility(hit)), u, hit.normal, 0,
-                                         std::sqrt(friction * cloths_->friction(hit)));
+  const Vec3 impulse = cloths_->impulse(hit, u, {mass, 0, friction});
   contact.impulse += impulse;
   v += impulse / mass;
   return true;

@@ -20,6 +20,9 @@ constexpr std::size_t kChunk = 1024;
 constexpr Real kStepsBefore = 120, kMostStepsBefore = 10000;
 /// Greatest number of hits on cloth in a sub-step, for particles that collide with particles.
 constexpr int kMostClothHits = 8;
+/// Particles at a distance from a body of less than this fraction of their radius may touch it, because
+/// impulses may close the gap. It is greater than ParticleContacts::kMargin.
+constexpr Real kNear = 0.2;
 /// Durations below this are rounding errors [s].
 constexpr Real kRounding = 1e-11;
 
@@ -235,25 +238,69 @@ ParticleEvent ParticleSystem::collision_event(const ParticleStage& stage, std::s
 
 ParticleTally ParticleSystem::sum_up(std::span<const ParticleTally> tallies) {
   since_birth.clear();
+  has_flown_ = false;
+  on_bodies_.clear();
+  is_on_body_.clear();
   ParticleTally sum;
   for (const ParticleTally& t : tallies) sum += t;
   if (sum.expired + sum.retired + sum.removed > 0) remove_dead();
   return sum;
 }
 
-ParticleTally ParticleSystem::step(const ParticleStage& stage, const ParticleForces& forces, bool coupled) {
+Aabb ParticleSystem::reach(Real h, const Vec3& gravity) const {
+  Aabb bounds;
+  for (std::size_t i = 0; i < arrays.size(); ++i) {
+    const Real reach = arrays.radius[i] + 2 * h * (arrays.velocity[i].norm() + h * gravity.norm());
+    bounds.extend(arrays.position[i] - Vec3::Constant(reach));
+    bounds.extend(arrays.position[i] + Vec3::Constant(reach));
+  }
+  return bounds;
+}
+
+void ParticleSystem::find_on_bodies(const ParticleStage& stage) {
+  const std::size_t count = arrays.size();
+  is_on_body_.assign(count, 0);
+  tbb::parallel_for(std::size_t{0}, chunk_count(count), [&](std::size_t chunk) {
+    NearObstacles near(stage.fixed, stage.moving);
+    for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) {
+      const Vec3& end = arrays.position[i];
+      if (!(duration_[i] > 0) || !end.allFinite() || !arrays.velocity[i].allFinite()) continue;
+      near.find(start_position_[i], end, (1 + kNear) * arrays.radius[i]);
+      is_on_body_[i] = std::ranges::any_of(near.all(), [](const Obstacle* o) { return o->is_dynamic(); });
+    }
+  });
+  for (uint32_t i = 0; i < count; ++i)
+    if (is_on_body_[i]) on_bodies_.push_back(i);
+  if (on_bodies_.empty()) is_on_body_.clear();
+}
+
+/// Calls make_landing as fly_each() does, after fly_all().
+template <class MakeLanding>
+void ParticleSystem::land_flown(bool coupled, MakeLanding&& make_landing) {
+  const std::size_t count = arrays.size(), old = count - since_birth.size(), chunks = chunk_count(old);
+  tbb::parallel_for(std::size_t{0}, chunks + chunk_count(since_birth.size()), [&](std::size_t chunk) {
+    const std::size_t begin = chunk < chunks ? chunk * kChunk : old + (chunk - chunks) * kChunk;
+    const std::size_t end = std::min(chunk < chunks ? old : count, begin + kChunk);
+    auto land = make_landing(chunk);
+    for (std::size_t i = begin; i < end; ++i) land(i, flight(i), coupled && whole_step(i));
+  });
+}
+
+ParticleTally ParticleSystem::step(const ParticleStage& stage, const ParticleForces& forces, bool coupled,
+                                   std::span<const uint8_t> trapped) {
   const std::size_t old = arrays.size() - since_birth.size();
   fate_.resize(arrays.size());
   std::vector<ParticleTally> tallies(chunk_count(old) + chunk_count(since_birth.size()));
   std::vector<SweepLog> logs(tallies.size());
   std::vector<std::vector<Striker>> strikers(tallies.size());
-  fly_each(stage, forces, coupled, [&](std::size_t chunk) {
+  const auto make_landing = [&](std::size_t chunk) {
     logs[chunk].wants_strikes = def.report_collisions;
     return [&, chunk, &log = logs[chunk],
             obstacles = ParticleSweep(stage.fixed, stage.moving, stage.cloths, forces, stage.h, logs[chunk])](
                std::size_t i, const Flight& flight, bool integrated) mutable {
+      if (!is_on_body_.empty() && is_on_body_[i]) return;
       ParticleTally& tally = tallies[chunk];
-      arrays.age[i] += flight.duration;
+      if (!has_flown_) arrays.age[i] += flight.duration;
       if (is_lost(i, flight, tally)) {
         fate_[i] = Fate::dead;
         return;
@@ -271,13 +318,25 @@ ParticleTally ParticleSystem::step(const ParticleStage& stage, const ParticleFor
       }
       finish_sweep(stage, i, outcome, log, tally);
     };
-  });
+  };
+  if (has_flown_)
+    land_flown(coupled, make_landing);
+  else
+    fly_each(stage, forces, coupled, make_landing);
   std::vector<Striker> all;
   for (std::size_t chunk = 0; chunk < logs.size(); ++chunk) {
     for (const Reaction& r : logs[chunk].reactions) stage.impulses.push(r);
     all.insert(all.end(), strikers[chunk].begin(), strikers[chunk].end());
   }
   if (!all.empty()) strike_bodies(stage, forces, std::move(all), tallies.front());
+  for (const uint32_t i : on_bodies_) {
+    if (is_lost(i, flight(i), tallies.front())) {
+      fate_[i] = Fate::dead;
+      continue;
+    }
+    if (!stage.cloths.empty()) meet_cloths(stage, forces, i, tallies.front());
+    end(stage, i, false, trapped[i], tallies.front());
+  }
   return sum_up(tallies);
 }
 
@@ -313,6 +372,7 @@ void ParticleSystem::fly_all(const ParticleStage& stage, const ParticleForces& f
   start_position_.resize(arrays.size());
   start_velocity_.resize(arrays.size());
   duration_.resize(arrays.size());
+  has_flown_ = true;
   fly_each(stage, forces, coupled, [&](std::size_t) {
     return [&](std::size_t i, const Flight& flight, bool) {
       start_position_[i] = flight.position;

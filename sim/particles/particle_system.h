@@ -60,13 +60,24 @@ struct ParticleSystem {
   void begin_coupled();
   /// Whether ParticleCollisions resolves the collisions of this system.
   bool hits_particles() const { return def.internal || def.external || def.rotates; }
-  /// Advances a system whose particles do not collide with particles: integrates them, sweeps them against
-  /// bodies, and removes those whose life has ended. `coupled`: the particles for which whole_step() is true
-  /// have been integrated already.
-  ParticleTally step(const ParticleStage& stage, const ParticleForces& forces, bool coupled);
+  /// Whether particles of a system that does not collide with particles may rest on bodies.
+  bool may_rest() const { return !hits_particles() && def.collides && !def.dies_on_hit; }
+  /// Box around the paths of the particles in the next sub-step of length h [s].
+  Aabb reach(Real h, const Vec3& gravity) const;
+  /// For a system that may_rest(), after fly_all(): finds the particles that may touch dynamic bodies in this
+  /// sub-step. ParticleCollisions resolves their collisions, too, because particles that rest on a body and
+  /// the body determine each other's motion.
+  void find_on_bodies(const ParticleStage& stage);
+  std::span<const uint32_t> on_bodies() const { return on_bodies_; }
+  /// Advances a system whose particles do not collide with particles: integrates them unless fly_all() has
+  /// done so, sweeps them against bodies, and removes those whose life has ended. `coupled`: the particles
+  /// for which whole_step() is true have been integrated already. `trapped`:
+  /// ParticleCollisions::Outcome::trapped for those on_bodies().
+  ParticleTally step(const ParticleStage& stage, const ParticleForces& forces, bool coupled,
+                     std::span<const uint8_t> trapped = {});
 
-  /// For a system whose particles collide with particles: integrates without collisions, and stores the
-  /// initial states for flight().
+  /// For a system whose particles collide with particles or may rest on bodies: integrates without
+  /// collisions, and stores the initial states for flight().
   void fly_all(const ParticleStage& stage, const ParticleForces& forces, bool coupled);
   /// A particle's flight: initial state and duration.
   struct Flight {
@@ -91,6 +102,8 @@ struct ParticleSystem {
   template <class MakeLanding>
   void fly_each(const ParticleStage& stage, const ParticleForces& forces, bool coupled,
                 MakeLanding&& make_landing);
+  template <class MakeLanding>
+  void land_flown(bool coupled, MakeLanding&& make_landing);
   bool is_lost(std::size_t i, const Flight& flight, ParticleTally& tally) const;
   struct Striker;
   void strike_bodies(const ParticleStage& stage, const ParticleForces& forces, std::vector<Striker> strikers,
@@ -112,6 +125,9 @@ struct ParticleSystem {
 
   std::vector<Vec3> start_position_, start_velocity_;  // for a coupled system, or after fly_all()
   std::vector<Real> duration_;                         // after fly_all()
+  bool has_flown_ = false;                             // whether fly_all() was called in this sub-step
+  std::vector<uint32_t> on_bodies_;                    // ascending
+  std::vector<uint8_t> is_on_body_;                    // by particle; empty if none is
   std::vector<Fate> fate_;
 };
 

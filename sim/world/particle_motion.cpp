@@ -34,23 +34,26 @@ bool ParticleMotion::step(Real start, Real h, const CoupledSystem& coupled,
   for (const auto& articulation : world_.articulations) articulation->begin_impulses(start + h);
   impulses_.begin(joints_.links(), std::move(expected));
   events_.clear();
-  gather_cloths();
+  gather_cloths(h);
   const ParticleStage stage{start,     h,      obstacles_.fixed(), obstacles_.moving(), world_.def.bounds,
                             impulses_, cloths_};
   report.solvers.particle_lcp.add(collide(stage, coupled));
   impulses_.subtract_expected();
-  auto collided = collisions_.outcomes().begin();
+  const std::span<ParticleCollisions::Outcome> outcomes = collisions_.outcomes();
   bool any_removed = false;
   world_.systems.for_each([&](ParticleSystemHandle handle, ParticleSystem& system) {
     if (waits(handle)) return;
     ParticleTally tally;
+    const auto at = std::ranges::find(colliding_, &system);
+    ParticleCollisions::Outcome* const collided =
+        at == colliding_.end() ? nullptr : &outcomes[static_cast<std::size_t>(at - colliding_.begin())];
+    if (collided) tally = std::move(collided->tally);
     if (system.hits_particles()) {
-      tally = std::move(collided->tally);
       system.meet_cloths(stage, world_.forces(system), collided->touched, tally);
       tally += system.end_step(stage, collided->touched, collided->trapped);
-      ++collided;
     } else {
-      tally = system.step(stage, world_.forces(system), coupled.holds(system));
+      const std::span<const uint8_t> trapped = collided ? collided->trapped : std::span<const uint8_t>{};
+      tally += system.step(stage, world_.forces(system), coupled.holds(system), trapped);
     }
     add(tally.events);
     report.particles.add(tally);
@@ -68,35 +71,40 @@ bool ParticleMotion::step(Real start, Real h, const CoupledSystem& coupled,
 Aabb ParticleMotion::colliding_bounds(Real h) const {
   Aabb bounds;
   world_.systems.for_each([&](ParticleSystemHandle handle, const ParticleSystem& system) {
-    if (!system.hits_particles() || !system.def.collides || waits(handle)) return;
-    const ParticleArrays& p = system.arrays;
-    for (std::size_t i = 0; i < p.size(); ++i) {
-      const Real reach = p.radius[i] + 2 * h * (p.velocity[i].norm() + h * world_.def.gravity.norm());
-      bounds.extend(p.position[i] - Vec3::Constant(reach));
-      bounds.extend(p.position[i] + Vec3::Constant(reach));
-    }
+    if (!system.def.collides || waits(handle)) return;
+    if (system.hits_particles() || system.may_rest()) bounds.extend(system.reach(h, world_.def.gravity));
   });
   return bounds;
 }
 
 /// Collects the cloths with which particles collide. While particles are prewarmed, cloths stand still.
-void ParticleMotion::gather_cloths() {
-  cloths_.clear();
+void ParticleMotion::gather_cloths(Real h) {
+  cloths_.clear(impulses_);
   bool wanted = false;
   world_.systems.for_each([&](ParticleSystemHandle, const ParticleSystem& s) {
     wanted |= s.def.collides && s.arrays.size() > 0;
   });
   if (!wanted) return;
   std::vector<Real> inverse_masses;
+  std::vector<ClothObstacles::Pin> held;
+  std::map<uint32_t, uint32_t> holders;  // by slot
   world_.cloths.for_each([&](ClothHandle, const std::unique_ptr<Cloth>& cloth) {
     if (cloth->absent || !cloth->def.collides) return;
     inverse_masses.assign(cloth->points.size(), 0);
+    held.clear();
     const bool moves = !cloth->stopped && !is_prewarming_;
     for (std::size_t i = 0; moves && i < cloth->points.size(); ++i) inverse_masses[i] = 1 / cloth->masses[i];
-    for (const ClothPin& pin : cloth->pins) inverse_masses[pin.vertex] = 0;
+    for (const ClothPin& pin : cloth->pins) {
+      inverse_masses[pin.vertex] = 0;
+      const std::unique_ptr<Body>* body = world_.bodies.find(pin.body);
+      if (!moves || !body || (*body)->absent || !(*body)->is_dynamic()) continue;
+      const auto [holder, is_new] = holders.try_emplace(pin.body.index, 0);
+      if (is_new) holder->second = cloths_.add_holder(swept_obstacle(**body, h));
+      held.push_back({pin.vertex, holder->second, (*body)->asleep ? 0 : cloth->masses[pin.vertex]});
+    }
     const std::vector<Vec3>& before = moves ? cloth->before : cloth->points;
     cloths_.add(before, cloth->points, cloth->velocities, inverse_masses, cloth->triangles,
-                cloth->def.friction);
+                cloth->def.friction, held);
   });
   cloths_.build();
 }
@@ -104,6 +112,7 @@ void ParticleMotion::gather_cloths() {
 /// Changes the velocities of the cloths by the impulses of particles.
 void ParticleMotion::return_cloths() {
   if (cloths_.empty() || is_prewarming_) return;
+  cloths_.finish();
   std::size_t k = 0;
   world_.cloths.for_each([&](ClothHandle, const std::unique_ptr<Cloth>& cloth) {
     if (cloth->absent || !cloth->def.collides) return;
@@ -112,19 +121,30 @@ void ParticleMotion::return_cloths() {
   });
 }
 
-/// Moves the particles that collide with other particles, of all systems together. Returns the work of the
-/// solver.
+/// Moves the particles that collide with other particles or may rest on dynamic bodies, of all systems
+/// together. Returns the work of the solver.
 ContactWork ParticleMotion::collide(const ParticleStage& stage, const CoupledSystem& coupled) {
-  std::vector<ParticleSystem*> colliding;
+  colliding_.clear();
+  std::vector<Aabb> dynamic;  // boxes of the bodies that particles may move
+  for (const std::span<const Obstacle> obstacles : {stage.moving.all(), stage.fixed.all()})
+    for (const Obstacle& o : obstacles)
+      if (o.is_dynamic()) dynamic.push_back(o.swept_bounds());
   world_.systems.for_each([&](ParticleSystemHandle handle, ParticleSystem& system) {
-    if (!system.hits_particles() || waits(handle)) return;
+    if (waits(handle)) return;
+    const bool hits_particles = system.hits_particles();
+    if (!hits_particles) {
+      if (!system.may_rest() || dynamic.empty() || system.arrays.size() == 0) return;
+      const Aabb reach = system.reach(stage.h, world_.def.gravity);
+      if (std::ranges::none_of(dynamic, [&](const Aabb& box) { return box.intersects(reach); })) return;
+    }
     system.fly_all(stage, world_.forces(system), coupled.holds(system));
-    colliding.push_back(&system);
+    if (!hits_particles) system.find_on_bodies(stage);
+    if (hits_particles || !system.on_bodies().empty()) colliding_.push_back(&system);
   });
-  if (colliding.empty()) return {};
+  if (colliding_.empty()) return {};
   const WorldDef& def = world_.def;
   const bool by_lcp = def.particle_contacts == ParticleContactMethod::lcp;
-  collisions_.step(colliding, stage, def.impact, def.collision_speed, by_lcp ? def.particle_cluster : 0);
+  collisions_.step(colliding_, stage, def.impact, def.collision_speed, by_lcp ? def.particle_cluster : 0);
   return collisions_.lcp_work();
 }
 

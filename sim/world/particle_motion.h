@@ -22,8 +22,8 @@ class ParticleMotion {
   /// already only collide. `expected`: loads of bodies, by slot. Returns whether any particle was removed.
   bool step(Real start, Real h, const CoupledSystem& coupled, std::map<uint32_t, BodyImpulses::Load> expected,
             StepReport& report);
-  /// Box around the paths of the particles that collide with each other and with bodies, in the next sub-step
-  /// of length h [s].
+  /// Box around the paths of the particles that collide with bodies and may rest on them, in the next
+  /// sub-step of length h [s].
   Aabb colliding_bounds(Real h) const;
   /// Impulses on bodies in the last sub-step.
   const BodyImpulses& impulses() const { return impulses_; }
@@ -40,7 +40,7 @@ class ParticleMotion {
   bool waits(ParticleSystemHandle system) const;
   ContactWork collide(const ParticleStage& stage, const CoupledSystem& coupled);
   void add(std::vector<ParticleEvent>& events);
-  void gather_cloths();
+  void gather_cloths(Real h);
   void return_cloths();
 
   WorldState& world_;
@@ -50,6 +50,7 @@ class ParticleMotion {
   ClothObstacles cloths_;
   ParticleCollisions collisions_;
   BodyImpulses impulses_;
+  std::vector<ParticleSystem*> colliding_;  // the systems of collisions_ in this sub-step
   std::vector<ParticleEvent> events_;
   bool is_prewarming_ = false;
   std::vector<ParticleSystemHandle> waiting_;  // systems that are paused while others are prewarmed

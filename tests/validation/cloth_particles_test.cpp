@@ -112,6 +112,79 @@ TEST(ClothParticles, MeetATriangleAsABodyOfItsMass) {
   }
 }
 
+/// A cloth of 0.4 m, some or all points of which are pinned to a plate of 0.2 kg behind it, in free flight.
+struct ClothOnPlate {
+  World world{{.gravity = Vec3::Zero(), .max_step = 1.0 / 240, .sleep = false}};
+  BodyHandle plate;
+  ClothHandle cloth;
+  ParticleSystemHandle shot;
+  std::vector<Real> masses;
+  Real mass = 0.2;
+
+  ClothOnPlate(bool whole, bool internal) {
+    constexpr uint32_t kCells = 8;
+    plate = world.add_body(
+        {.shape = Box{{0.3, 0.02, 0.2}}, .pose = {Vec3(0.1, -0.1, 0)}, .mass = mass, .collides = false});
+    ClothDef def = wide_cotton(0.4, kCells, {0, 0, 0});
+    def.air.density = 0;
+    for (uint32_t k = 0; k < def.vertices.size(); ++k)
+      if (whole || def.vertices[k].x() < -0.05)
+        def.pins.push_back({.vertex = k, .body = plate, .position = def.vertices[k] - Vec3(0.1, -0.1, 0)});
+    masses = def.masses;
+    cloth = world.add_cloth(def);
+    shot = world.add_particle_system({.name = "shot", .internal = internal});
+  }
+  void add_shot(const Vec3& place, const Vec3& velocity) {
+    world.add_particle(shot, {.position = place,
+                              .velocity = velocity,
+                              .mass = 2e-3,
+                              .radius = 0.004,
+                              .restitution = 0.4,
+                              .friction = 0.5});
+  }
+  Vec3 momentum() const {
+    Vec3 sum = mass * world.body(plate).velocity;
+    const ClothView view = world.cloth(cloth);
+    for (std::size_t i = 0; i < masses.size(); ++i) sum += masses[i] * view.velocities[i];
+    for (const Vec3& v : world.particles(shot).velocity) sum += 2e-3 * v;
+    return sum;
+  }
+};
+
+/// Hits on points that are pinned to a free body push the body.
+TEST(ClothParticles, PushTheBodyThatHoldsTheCloth) {
+  for (const bool whole : {true, false})
+    for (const bool internal : {false, true}) {
+      ClothOnPlate scene(whole, internal);
+      for (int i = 0; i < 40; ++i)
+        scene.add_shot({0.15 * scatter(2 * i), 0.1 + 0.02 * i, 0.15 * scatter(2 * i + 1)}, {1, -5, 0.5});
+      const Vec3 before = scene.momentum();
+      for (int i = 0; i < 60; ++i) scene.world.step(1.0 / 60);
+      EXPECT_LT((scene.momentum() - before).norm(), 1e-6 * before.norm())
+          << "all points pinned: " << whole << " internal: " << internal << " "
+          << scene.momentum().transpose() << " before " << before.transpose();
+      EXPECT_LT(scene.world.body(scene.plate).velocity.y(), -0.3);
+    }
+}
+
+/// The body moves as its joint permits, with the mass of the cloth that is pinned to it.
+TEST(ClothParticles, PushAJointedBodyThatHoldsTheCloth) {
+  for (const bool internal : {false, true}) {
+    ClothOnPlate scene(true, internal);
+    scene.world.add_joint(
+        {.name = "rail", .type = JointType::prismatic, .a = scene.plate, .axis = Vec3::UnitY()});
+    scene.add_shot({-0.12, 0.1, 0.05}, {0, -5, 0});
+    for (int i = 0; i < 10; ++i) scene.world.step(1.0 / 60);
+    Real whole = scene.mass;
+    for (const Real m : scene.masses) whole += m;
+    // m2 u2' = m12 (1 + e) u1
+    const Vec3 v = scene.world.body(scene.plate).velocity;
+    EXPECT_NEAR(v.y(), -1.4 * 5 * 2e-3 / (2e-3 + whole), 1e-6) << internal;
+    EXPECT_LT(std::hypot(v.x(), v.z()), 1e-9);
+    EXPECT_LT(scene.world.body(scene.plate).angular_velocity.norm(), 1e-9);
+  }
+}
+
 /// Particles that lie on a pinned cloth stay on it. They vibrate by up to g h^2, because each side sees the
 /// impulses of the other one only in the next sub-step.
 TEST(ClothParticles, RestOnAPinnedCloth) {

@@ -13,14 +13,15 @@ namespace {
 
 constexpr Real kWeightPerMass = 9.81, kPlateMass = 1, kBeadRadius = 0.012;
 
-/// A plate with nine beads on it. They collide with each other.
+/// A plate with nine beads on it.
 struct Scale {
   World world;
   BodyHandle plate;
   ParticleSystemHandle beads;
 
   /// `beads_mass`: mass of all beads [kg]. They start `height` [m] above the plate, whose top is at y = 0.
-  Scale(Real step, Real beads_mass, Real height = 0, Real lifespan = 1e9, bool sleep = false)
+  /// `internal`: whether they collide with each other.
+  Scale(Real step, Real beads_mass, bool internal, Real height = 0, Real lifespan = 1e9, bool sleep = false)
       : world({.max_step = step, .sleep = sleep}) {
     plate = world.add_body({.name = "plate",
                             .shape = Box{{0.3, 0.02, 0.3}},
@@ -28,7 +29,7 @@ struct Scale {
                             .mass = kPlateMass,
                             .restitution = 0,
                             .friction = 0.3});
-    beads = world.add_particle_system({.internal = true});
+    beads = world.add_particle_system({.internal = internal});
     for (int i = 0; i < 9; ++i)
       world.add_particle(beads, {.position = {0.06 * (i % 3 - 1), kBeadRadius + height, 0.06 * (i / 3 - 1)},
                                  .mass = beads_mass / 9,
@@ -69,15 +70,16 @@ struct Scale {
 
 struct ScaleCase {
   Real step, mass;
+  bool internal;
 };
 class ParticleLoads : public testing::TestWithParam<ScaleCase> {};
 
 // The spring sags by the weight of plate and beads. Forces of resting particles reach the body within the
 // sub-step. As impulses at its end, they left a plate under twice its mass jumping at 0.2 m/s.
 TEST_P(ParticleLoads, StretchASpringByTheirWeight) {
-  const auto [step, mass] = GetParam();
+  const auto [step, mass, internal] = GetParam();
   for (const bool is_guided : {false, true}) {
-    Scale scale(step, mass);
+    Scale scale(step, mass, internal);
     const Real sag = 0.04, stiffness = (kPlateMass + mass) * kWeightPerMass / sag;
     if (is_guided) scale.guide();
     scale.hang(stiffness, std::sqrt(stiffness * (kPlateMass + mass)));
@@ -92,8 +94,8 @@ TEST_P(ParticleLoads, StretchASpringByTheirWeight) {
 // The floor carries the weight of both. The plate stays where it is as the beads fall onto it, and as they
 // are removed.
 TEST_P(ParticleLoads, PressALightPlateOnAFloor) {
-  const auto [step, mass] = GetParam();
-  Scale scale(step, mass, 0.1, 2);
+  const auto [step, mass, internal] = GetParam();
+  Scale scale(step, mass, internal, 0.1, 2);
   scale.add_floor();
   for (int i = 0; i < 120; ++i) {
     scale.run(1.0 / 60);
@@ -109,14 +111,16 @@ TEST_P(ParticleLoads, PressALightPlateOnAFloor) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, ParticleLoads,
-                         testing::Values(ScaleCase{1.0 / 240, 0.5}, ScaleCase{1.0 / 240, 2},
-                                         ScaleCase{1.0 / 240, 20}, ScaleCase{1.0 / 60, 0.5},
-                                         ScaleCase{1.0 / 60, 2}));
+                         testing::Values(ScaleCase{1.0 / 240, 0.5, true}, ScaleCase{1.0 / 240, 2, true},
+                                         ScaleCase{1.0 / 240, 20, true}, ScaleCase{1.0 / 60, 0.5, true},
+                                         ScaleCase{1.0 / 60, 2, true}, ScaleCase{1.0 / 240, 0.5, false},
+                                         ScaleCase{1.0 / 240, 2, false}, ScaleCase{1.0 / 240, 20, false},
+                                         ScaleCase{1.0 / 60, 0.5, false}, ScaleCase{1.0 / 60, 2, false}));
 
 // Plate and beads oscillate together, at sqrt(k / (m + M)).
 TEST(ParticleLoad, TakesPartInOscillations) {
   for (const Real mass : {0.5, 2.0, 10.0}) {
-    Scale scale(1.0 / 240, mass);
+    Scale scale(1.0 / 240, mass, true);
     const Real amplitude = 0.03, rate = 10, stiffness = rate * rate * (kPlateMass + mass);
     scale.guide();
     scale.hang(stiffness, 0, amplitude - kWeightPerMass / (rate * rate));
@@ -136,7 +140,7 @@ TEST(ParticleLoad, TakesPartInOscillations) {
 // The load moves all links of a chain together. When only the plate moved, the force on the upper hook
 // changed by a third from sub-step to sub-step.
 TEST(ParticleLoad, PullsAtAChainOfLinks) {
-  Scale scale(1.0 / 240, 5);
+  Scale scale(1.0 / 240, 5, true);
   const auto link = scale.world.add_body({.name = "link",
                                           .shape = Box{{0.02, 0.2, 0.02}},
                                           .pose = {Vec3(0, 0.3, 0)},
@@ -162,14 +166,39 @@ TEST(ParticleLoad, PullsAtAChainOfLinks) {
   }
 }
 
+// Dry friction of a vertical rail, or a motor at rest, holds plate and beads. When default particles acted by
+// impulses between the solutions of the joint, the plate crept by 1 cm/s.
+TEST(ParticleLoad, DoesNotMoveAPlateThatAJointHolds) {
+  for (const Real step : {1.0 / 240, 1.0 / 60})
+    for (const bool internal : {false, true})
+      for (const bool has_motor : {false, true}) {
+        constexpr Real kBeads = 0.5, kHold = 7 * (kPlateMass + kBeads) * kWeightPerMass;
+        Scale scale(step, kBeads, internal);
+        JointDef rail{.name = "rail", .type = JointType::prismatic, .a = scale.plate, .axis = Vec3::UnitY()};
+        if (has_motor)
+          rail.motor = {.mode = Motor::Mode::speed, .max_effort = kHold};
+        else
+          rail.friction = kHold;
+        scale.world.add_joint(rail);
+        scale.run(2);
+        const Real before = scale.height();
+        scale.run(4);
+        EXPECT_NEAR(scale.height(), before, 1e-6) << "step " << step << " internal " << internal;
+        EXPECT_NEAR(before, 0, 2 * kWeightPerMass * step * step)
+            << "step " << step << " internal " << internal;
+      }
+}
+
 // A sleeping body carries the particles on it, and does not wake again and again.
 TEST(ParticleLoad, DoesNotWakeABody) {
-  Scale scale(1.0 / 240, 0.5, 0.05, 1e9, true);
-  scale.add_floor();
-  scale.run(3);
-  for (int i = 0; i < 300; ++i) {
-    scale.run(1.0 / 60);
-    EXPECT_TRUE(scale.world.is_asleep(scale.plate)) << i;
+  for (const bool internal : {false, true}) {
+    Scale scale(1.0 / 240, 0.5, internal, 0.05, 1e9, true);
+    scale.add_floor();
+    scale.run(3);
+    for (int i = 0; i < 300; ++i) {
+      scale.run(1.0 / 60);
+      EXPECT_TRUE(scale.world.is_asleep(scale.plate)) << i << " internal " << internal;
+    }
   }
 }
 
