@@ -375,7 +375,10 @@ void Stage::Impl::draw_translucent(std::span<const Cloth* const> sheets, std::sp
                         light_sources.open_air);
   SkyModel sky_of_frame = sky;
   sky_of_frame.sun_direction = frame.sun_direction.head<3>();
-  const PuffLight light(puffs_pass.grid(), frame, sky_of_frame, sun.direction.normalized(), air, around);
+  const PuffLight light{
+      {puffs_pass.grid(), air, around, sun.direction.normalized(), frame.sun_radiance.head<3>()},
+      frame,
+      sky_of_frame};
   points_pass.prepare_blended(paint_order, light);
   puffs_pass.prepare_splats(paint_order, view, light);
   streaks_pass.prepare(paint_order, view, light, offsets.index == 0);

@@ -32,14 +32,6 @@ struct GlassPiece {
   bool contains(const Vector3f& place, float margin_m) const;
 };
 
-/// Light at a point in the air. A white surface there with the unit normal n has the radiance
-/// constant + slope * n.
-struct AirRadiance {
-  Vector3f constant = Vector3f::Zero();
-  Eigen::Matrix3f slope = Eigen::Matrix3f::Zero();  ///< rows: red, green, blue
-  Vector3f at(const Vector3f& normal) const { return (constant + slope * normal).cwiseMax(0.0f); }
-};
-
 struct LightSources {
   Sun sun;
   SkyModel sky;
