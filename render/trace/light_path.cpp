@@ -187,11 +187,10 @@ Vector3f LightTracer::sky_met(const Vector3f& direction, bool sharp, float densi
   return fraction * turned.intensity * turned.picture->seen(there);
 }
 
-float LightTracer::sun_visibility(const Vector3f& place, const SquarePoint<float>& uv) const {
-  const Sun& sun = sources_.sun;
-  float fraction = sources_.smoke != nullptr ? std::exp(-sources_.smoke->depth(place)) : 1.0f;
-  if (!sun.shadows) return fraction;
-  return fraction * scene_.transmittance(place, sun_disc_.direction(uv), kFar).mean();
+Vector3f LightTracer::sun_visibility(const Vector3f& place, const SquarePoint<float>& uv) const {
+  const float fraction = sources_.smoke != nullptr ? std::exp(-sources_.smoke->depth(place)) : 1.0f;
+  if (!sources_.sun.shadows) return Vector3f::Constant(fraction);
+  return fraction * scene_.transmittance(place, sun_disc_.direction(uv), kFar);
 }
 
 // Prepares particles for rays, before any ray is traced that can meet them. Computes their light.
@@ -368,7 +367,8 @@ LightTracer::DirectLight LightTracer::direct_light(const Hit& hit, const Vector3
   const float towards_sun = hit.normal.dot(sources_.sky.sun_direction);
   const SquarePoint<float> on_sun = sampler.next();
   if (towards_sun > 0 && sources_.sun.intensity > 0)
-    result.sun = sources_.sun.intensity * towards_sun * sun_visibility(from, on_sun) * sources_.sun.color;
+    result.sun = (sources_.sun.intensity * towards_sun * sun_visibility(from, on_sun))
+                     .cwiseProduct(sources_.sun.color);
   result.lamps = lamps_at(from, hit.lamp_normal, hit.face, sampler);
   result.glow = glow_at(from, hit.lamp_normal, hit.face, sampler);
   return result;
@@ -532,7 +532,7 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
     if (pixel >= 0) {
       const Vector4f& arriving = visible->arriving(pixel);
       const float cosine = hit.normal.dot(sources_.sky.sun_direction), through = hit.translucency;
-      const Vector3f sun = sources_.sun.intensity * arriving.w() * sources_.sun.color;
+      const Vector3f sun = (sources_.sun.intensity * visible->sun(pixel)).cwiseProduct(sources_.sun.color);
       const Vector3f from_front = response.around.cwiseProduct(arriving.head<3>()) +
                                   response.lamps.cwiseProduct(visible->lamps(pixel)) +
                                   std::max(cosine, 0.0f) * response.sun.cwiseProduct(sun);

@@ -40,6 +40,7 @@ struct LightSources {
   std::vector<RayLamp> lamps;
   Glow glow;
   std::vector<GlassPiece> glass;
+  bool sun_is_tinted = false;          ///< whether panes give the light of the sun another colour
   const OpacityGrid* smoke = nullptr;  ///< opacity of the smoke; null: there is no smoke
   RayParticles* particles = nullptr;   ///< the particles in mirror images; null: there are none
   AirRadiance open_air;                ///< light of the sky on particles, without objects

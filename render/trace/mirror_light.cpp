@@ -175,7 +175,8 @@ void LightTracer::trace_glass(const SurfaceBuffer& surfaces, int x0, int y0, con
             !sources_.sky_is_visible && behind.opacity(behind.pixel(x0 + x + i, y0 + y)) == 0;
         const FoundLight through = light_through(point, view, sampler, behind, from_background);
         glass.mirrored[pixel] << mirrored, through.background;
-        glass.through[pixel] << through.limited(sums), sunny ? sun_visibility(point.place, on_sun) : 0.0f;
+        glass.through[pixel] << through.limited(sums),
+            sunny ? sun_visibility(point.place, on_sun).mean() : 0.0f;
       }
     }
   });

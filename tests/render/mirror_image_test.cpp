@@ -484,14 +484,15 @@ struct PaneScene {
 // that the second one mirrors is added to the refracted light on the way to the eye.
 TEST(HighlightBehindGlass, LosesOnlyTheLightThatThePaneTakes) {
   const PaneScene scene;
-  const Vector3f tint(0.7f, 0.7f, 0.7f);
   const float there = std::pow(1 - fresnel_of_pane(-scene.to_light.z()), 2.0f);
   const float back = 1 - fresnel_of_pane(-scene.to_eye.z());
-  const Vector3f expected = there * back * tint.cwiseProduct(tint);
   for (const Material& material : {Material{.color = {0.8f, 0.8f, 0.8f, 1}, .metallic = 1, .roughness = 0.4f},
                                    Material{.color = {0, 0, 0, 1}, .roughness = 0.4f},
                                    Material{.color = {0.5f, 0.5f, 0.5f, 1}, .roughness = 1}})
-    for (const bool by_lamp : {false, true}) {
+    for (const auto& [by_lamp, tint] :
+         {std::pair(false, Vector3f(0.7f, 0.7f, 0.7f)), std::pair(true, Vector3f(0.7f, 0.7f, 0.7f)),
+          std::pair(false, Vector3f(0.9f, 0.6f, 0.4f)), std::pair(true, Vector3f(0.9f, 0.6f, 0.4f))}) {
+      const Vector3f expected = there * back * tint.cwiseProduct(tint);
       const Vector3f open = scene.light(material, by_lamp, -1, tint);
       const Vector3f fraction = scene.light(material, by_lamp, 0.05f, tint).cwiseQuotient(open);
       EXPECT_LT((fraction - expected).cwiseAbs().maxCoeff(), 0.03f)
