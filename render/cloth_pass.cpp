@@ -21,7 +21,7 @@ gl::LazyProgram make_surface_program(std::vector<std::string> defines) {
   defines.insert(defines.end(), {"FLAT 1", "WEAVE 0", "SURFACE 1"});
   return {{"frame.glsl", "cloth.vert"},
           {"frame.glsl", "sky.glsl", "light.glsl", "material.glsl", "noise.glsl", "surface.glsl",
-           "sheer.glsl", "fabric.glsl", "cloth.frag"},
+           "sheer.glsl", "threads.glsl", "fabric.glsl", "cloth.frag"},
           std::move(defines)};
 }
 
@@ -83,7 +83,7 @@ gl::LazyProgram& ClothPass::program(const GpuMaterial& material, const Features&
     defines.push_back("SHEER 1");
     fragment.push_back("sheer.glsl");
   }
-  fragment.insert(fragment.end(), {"fabric.glsl", "cloth.frag"});
+  fragment.insert(fragment.end(), {"threads.glsl", "fabric.glsl", "cloth.frag"});
   const std::vector<std::string_view> vertex = {"frame.glsl", "cloth.vert"};
   return programs_.emplace(key, gl::LazyProgram(vertex, fragment, defines)).first->second;
 }

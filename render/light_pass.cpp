@@ -8,7 +8,7 @@ namespace offstage::render {
 namespace {
 
 // Texture units of shaders/traced.glsl.
-constexpr GLuint kArrivingUnit = 8, kLampsUnit = 10, kMirroredUnit = 18, kHighlightsUnit = 19;
+constexpr GLuint kArrivingUnit = 8, kSunUnit = 9, kLampsUnit = 10, kMirroredUnit = 18, kHighlightsUnit = 19;
 // Texture units of shaders/glass.glsl.
 constexpr GLuint kThroughGlassUnit = 20, kMirroredByGlassUnit = 21;
 // Texture units of shaders/plain.frag.
@@ -89,12 +89,17 @@ LightView LightPass::light_view(const View& view, const SampleOffsets& offsets) 
           offsets, quick_};
 }
 
+// Creates those of the textures that do not exist.
+void LightPass::make_textures(std::initializer_list<gl::Texture*> textures) const {
+  for (gl::Texture* texture : textures)
+    if (*texture == 0)
+      *texture = gl::make_target(GL_RGBA32F, all_px_.sizes().x(), all_px_.sizes().y(), GL_NEAREST);
+}
+
 void LightPass::write_lamps(const Eigen::AlignedBox2i& area_px, const std::vector<Vector4f>& lamps,
                             const std::vector<Vector4f>& highlights) {
   if (lamps.empty()) return;
-  for (gl::Texture* texture : {&lamps_, &highlights_})
-    if (*texture == 0)
-      *texture = gl::make_target(GL_RGBA32F, all_px_.sizes().x(), all_px_.sizes().y(), GL_NEAREST);
+  make_textures({&lamps_, &highlights_});
   write_texture(lamps_, kLampsUnit, area_px, lamps);
   write_texture(highlights_, kHighlightsUnit, area_px, highlights);
 }
@@ -109,6 +114,9 @@ void LightPass::write_light(const Eigen::AlignedBox2i& area_px, const LightBuffe
   }
   mirrored_is_filled_ = light.has_mirrors;
   write_lamps(area_px, light.lamps, light.highlights);
+  if (light.sun.empty()) return;
+  make_textures({&sun_});
+  write_texture(sun_, kSunUnit, area_px, light.sun);
 }
 
 void LightPass::trace(const LightSources& sources, const View& view, const SampleOffsets& offsets,
@@ -142,9 +150,7 @@ bool LightPass::begin_part(GLuint depth, const Eigen::AlignedBox2i& area_px) {
 void LightPass::trace_glass(const LightSources& sources, const View& view, const SampleOffsets& offsets,
                             GLuint picture_framebuffer) {
   glDisable(GL_SCISSOR_TEST);
-  if (through_glass_ == 0)
-    for (gl::Texture* texture : {&through_glass_, &mirrored_by_glass_})
-      *texture = gl::make_target(GL_RGBA32F, all_px_.sizes().x(), all_px_.sizes().y(), GL_NEAREST);
+  make_textures({&through_glass_, &mirrored_by_glass_});
   read_surfaces(part_px_, surfaces_);
   picture_.resize(light_.arriving.size());
   glBindFramebuffer(GL_READ_FRAMEBUFFER, picture_framebuffer);

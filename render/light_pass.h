@@ -44,6 +44,7 @@ class LightPass {
  private:
   void read_surfaces(const Eigen::AlignedBox2i& area_px, SurfaceBuffer& surfaces) const;
   LightView light_view(const View& view, const SampleOffsets& offsets) const;
+  void make_textures(std::initializer_list<gl::Texture*> textures) const;
   void write_light(const Eigen::AlignedBox2i& area_px, const LightBuffer& light);
   void write_lamps(const Eigen::AlignedBox2i& area_px, const std::vector<Vector4f>& lamps,
                    const std::vector<Vector4f>& highlights);
@@ -61,6 +62,7 @@ class LightPass {
   gl::Texture arriving_, mirrored_;
   bool mirrored_is_filled_ = true;  ///< whether any value of the texture of mirrored light is not zero
   gl::Texture lamps_, highlights_;  ///< created when there are lamps
+  gl::Texture sun_;                 ///< created when panes tint the light of the sun
 
   // Created when there is a translucent object.
   gl::Texture part_depth_;

@@ -5,18 +5,9 @@
 #include <cmath>
 
 namespace offstage::render {
-PuffLight::PuffLight(const OpacityGrid& opacity, const FrameUniforms& frame_uniforms,
-                     const SkyModel& sky_model, const Vector3f& sun_direction, const AirLight& air_light,
-                     const AirField& light_around)
-    : grid(opacity),
-      frame(frame_uniforms),
-      air(air_light),
-      around(light_around),
-      sky(sky_model),
-      to_sun(sun_direction) {}
 
-AirRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vector3f& albedo, float number,
-                                const Vector3f& to_eye) const {
+ParticleLight SmokeLight::of_puff(const Vector3f& place, float radius, const Vector3f& albedo,
+                                  float number) const {
   // The optical depth and its gradient are computed from the corners of a tetrahedron in the puff.
   static const std::array<Vector3f, 4> kCorners = {Vector3f(1, 1, 1), Vector3f(1, -1, -1),
                                                    Vector3f(-1, 1, -1), Vector3f(-1, -1, 1)};
@@ -40,25 +31,40 @@ AirRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vecto
   const float steepness = slope.norm();
   const float change = std::min(radius * steepness, 3.0f);
   const float middle = sun_fraction_in_smoke(depth, white), direct = std::exp(-depth);
-  const float light = sun_fraction_in_smoke(std::max(depth - change, 0.0f), white),
+  const float bright = sun_fraction_in_smoke(std::max(depth - change, 0.0f), white),
               dark = sun_fraction_in_smoke(depth + change, white);
-  const float forward = std::max(-to_sun.dot(to_eye), 0.0f), forward2 = forward * forward;
-  const Vector3f sun = air.sun(place, radius, number) * frame.sun_radiance.head<3>();
+  const Vector3f sun = air.sun(place, radius, number) * sun_radiance;
   const float sky_fraction = 0.25f + 0.75f * std::exp(-0.6f * above);
 
   const AirRadiance lit_around = around.at(place).light;
-  AirRadiance result;
-  result.constant = sun * (0.68f * middle + 0.9f * direct * forward2 * forward2 * forward2) +
-                    sky_fraction * lit_around.constant;
+  ParticleLight light;
+  light.forward = 0.9f * direct * sun;
+  AirRadiance& result = light.diffuse;
+  result.constant = 0.68f * middle * sun + sky_fraction * lit_around.constant;
   Vector3f towards_light = 0.36f * direct * to_sun;
-  if (steepness > 1e-6f) towards_light -= 0.65f * (light - dark) / steepness * slope;
+  if (steepness > 1e-6f) towards_light -= 0.65f * (bright - dark) / steepness * slope;
   result.slope = sun * towards_light.transpose();
   air.for_each_lamp(place, radius, number, [&](const Vector3f& lamp, const Vector3f& towards) {
     result.constant += 0.3f * lamp;
     result.slope += 0.3f * lamp * towards.transpose();
   });
   result.slope += sky_fraction * lit_around.slope;
-  return result;
+  return light;
+}
+
+ParticleLight SmokeLight::of_particle(Scattering scattering, const Vector3f& place, float radius,
+                                      float number) const {
+  const bool sprite = scattering == Scattering::sprite, drop = scattering == Scattering::drop;
+  float fraction = air.sun(place, radius, number) * std::exp(-grid.depth(place));
+  if (sprite) fraction = 0.2f + 0.8f * fraction;  // some light reaches the shadow of a cloud from all sides
+  ParticleLight light{.diffuse = around.at(place).light,
+                      .forward = (drop ? 0.9f : 0.8f) * fraction * sun_radiance};
+  light.diffuse.constant += air.lamps_around(place, radius, number) + (sprite ? 0.45f
+                                                                       : drop ? 0.12f
+                                                                              : 0.4f) *
+                                                                          fraction * sun_radiance;
+  if (sprite) light.diffuse.slope += 0.35f * fraction * sun_radiance * to_sun.transpose();
+  return light;
 }
 
 Vector3f PuffLight::ambient(const Vector3f& n) const {

@@ -12,22 +12,26 @@
 
 namespace offstage::render {
 
-/// The lighting that all puffs of a sub-frame share.
-struct PuffLight {
+/// The lighting that all puffs of a sub-frame share, in the picture and in mirror images.
+struct SmokeLight {
   const OpacityGrid& grid;
-  const FrameUniforms& frame;
   const AirLight& air;
   const AirField& around;
-  SkyModel sky;
-  Vector3f to_sun;
+  Vector3f to_sun, sun_radiance;
 
-  /// Prepares the lighting of a sub-frame. `sky_model` must have the direction of the sun in this sub-frame.
-  PuffLight(const OpacityGrid& opacity, const FrameUniforms& frame_uniforms, const SkyModel& sky_model,
-            const Vector3f& sun_direction, const AirLight& air_light, const AirField& light_around);
-  /// Returns the radiance of a white puff at a place, as a function of the normal of its surface. `number`:
-  /// see AirLight::sun.
-  AirRadiance radiance(const Vector3f& place, float radius, const Vector3f& albedo, float number,
-                       const Vector3f& to_eye) const;
+  /// Returns the light that a white puff scatters. `number`: see AirLight::sun.
+  ParticleLight of_puff(const Vector3f& place, float radius, const Vector3f& albedo, float number) const;
+  /// Returns the light that another white particle scatters, as shaders/points.vert and drop_light() in
+  /// streaks_pass.cpp compute it.
+  ParticleLight of_particle(Scattering scattering, const Vector3f& place, float radius, float number) const;
+};
+
+/// The lighting that all particles in the picture of a sub-frame share. The direction of the sun in the model
+/// of the sky must be that of this sub-frame.
+struct PuffLight : SmokeLight {
+  const FrameUniforms& frame;
+  SkyModel sky;
+
   /// Returns the sky light on a white surface with this normal, as in shaders/sky.glsl.
   Vector3f ambient(const Vector3f& normal) const;
   /// Returns the sky light that a surface with this roughness reflects. `direction`: the mirrored direction.

@@ -186,8 +186,10 @@ void light_puff(const PointSet& set, std::size_t i, const Vector3f& eye,
       by_cell_normal(k, 2) = (0.5f + turn) * kFlameThick[k];
     }
   } else if (set.def.lit) {
-    radiance =
-        light.radiance(center, point.position.w(), albedo, point.velocity.w(), (eye - center).normalized());
+    const ParticleLight own = light.of_puff(center, point.position.w(), albedo, point.velocity.w());
+    radiance = own.diffuse;
+    radiance.constant +=
+        forward_lobe(Scattering::puff, light.to_sun.dot((center - eye).normalized())) * own.forward;
     by_cell_normal = radiance.slope * world_from_cell;
   } else {
     radiance.constant.setOnes();

@@ -29,11 +29,17 @@ std::vector<AirField::Ball> lit_particles(const PaintOrder& order) {
 }
 
 /// Returns whether the light that passes a mesh is traced by photons: it is solid glass that turns light.
-/// Light passes smooth panes in a straight line. The visible fraction of the sun is one number for all
-/// colours, so tinted panes have photons, too.
+/// Light passes smooth panes in a straight line.
 bool needs_photons(const RayMaterial& material, const RayMesh& mesh) {
   return material.transmission > 0 && !material.thin &&
-         (is_rough_glass(material.roughness) || material.is_tinted() || !mesh.is_plate());
+         (is_rough_glass(material.roughness) || !mesh.is_plate());
+}
+
+/// Returns whether light passes an object in a straight line and gets another colour.
+bool tints(const Instance& instance) {
+  const RayMaterial& material = *instance.material->rays;
+  return instance.visible && instance.casts_shadow && material.transmission > 0 && material.is_tinted() &&
+         !needs_photons(material, *instance.mesh->rays);
 }
 
 }  // namespace
@@ -101,7 +107,7 @@ std::vector<const Cloth*> Stage::Impl::prepare_cloths() {
   return result;
 }
 
-void Stage::Impl::prepare_lamps(std::span<PointSet* const> sets) {
+void Stage::Impl::prepare_lamps(std::span<const Instance* const> shown, std::span<PointSet* const> sets) {
   shining.clear();
   for (const Lamp& lamp : lamps)
     if (lamp.intensity.sum() > 0) shining.push_back(lamp);
@@ -109,6 +115,9 @@ void Stage::Impl::prepare_lamps(std::span<PointSet* const> sets) {
     if (set->def.style == PointStyle::fire) shining.push_back(lamp_of_fire(*set));
   features.clear();
   if (!shining.empty() || sky.has_bright_part()) features.push_back("LAMPS 1");
+  sun_is_tinted = sun.intensity > 0 && sun.shadows &&
+                  std::ranges::any_of(shown, [](const Instance* instance) { return tints(*instance); });
+  if (sun_is_tinted) features.push_back("TINTED_SUN 1");
   if (sky.turned.picture) features.push_back("SKY_PICTURE 1");
   if (sky.turned.picture && !sky.seen_as_colors) features.push_back("SKY_SEEN 1");
 }
@@ -139,6 +148,7 @@ void Stage::Impl::trace_light(std::span<const Instance* const> shown, std::span<
   RayScene& scene = light_pass.scene();
   scene.clear(time);
   light_sources = {.sun = sun, .sky = sky, .sky_is_visible = environment.visible, .fog = environment.fog};
+  light_sources.sun_is_tinted = sun_is_tinted;
   light_sources.open_air.constant = frame.irradiance_at(0);
   light_sources.open_air.slope << frame.irradiance_at(3), frame.irradiance_at(1), frame.irradiance_at(2);
   for (const Instance* instance : shown) {
@@ -375,7 +385,10 @@ void Stage::Impl::draw_translucent(std::span<const Cloth* const> sheets, std::sp
                         light_sources.open_air);
   SkyModel sky_of_frame = sky;
   sky_of_frame.sun_direction = frame.sun_direction.head<3>();
-  const PuffLight light(puffs_pass.grid(), frame, sky_of_frame, sun.direction.normalized(), air, around);
+  const PuffLight light{
+      {puffs_pass.grid(), air, around, sun.direction.normalized(), frame.sun_radiance.head<3>()},
+      frame,
+      sky_of_frame};
   points_pass.prepare_blended(paint_order, light);
   puffs_pass.prepare_splats(paint_order, view, light);
   streaks_pass.prepare(paint_order, view, light, offsets.index == 0);
@@ -438,7 +451,7 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum, const StopTest& st
   s.particles_behind_glass =
       std::ranges::any_of(shown, [](const Instance* i) { return i->visible && i->material->glass; }) &&
       std::ranges::any_of(sets, [](const PointSet* set) { return set->def.style != PointStyle::sphere; });
-  s.prepare_lamps(sets);
+  s.prepare_lamps(shown, sets);
   s.mesh_pass.prepare(shown, view, s.features);
   const std::vector<const Cloth*> sheets = s.prepare_cloths();
   s.draw_surfaces(sheets, sets);

@@ -82,6 +82,7 @@ struct Stage::Impl {
   std::vector<Lamp> shining;  ///< lamps and fires of this sub-frame
   float time = 0;
   Features features;                    ///< light-dependent definitions for the shaders in this sub-frame
+  bool sun_is_tinted = false;           ///< see LightSources, in this sub-frame
   bool particles_behind_glass = false;  ///< whether this sub-frame may show particles through glass
   LightSources light_sources;           ///< sources of light in this sub-frame
   RayParticles ray_particles;           ///< the particles in mirror images of this sub-frame
@@ -131,7 +132,7 @@ struct Stage::Impl {
   void draw_plain();
   std::vector<PointSet*> prepare_points(const View& view);
   std::vector<const Cloth*> prepare_cloths();
-  void prepare_lamps(std::span<PointSet* const> sets);
+  void prepare_lamps(std::span<const Instance* const> shown, std::span<PointSet* const> sets);
   void trace_light(std::span<const Instance* const> shown, std::span<const Cloth* const> sheets,
                    std::span<PointSet* const> sets, const View& view, const FrameUniforms& frame,
                    const SampleOffsets& offsets, const StopTest& stop);

@@ -101,7 +101,7 @@ vec3 sky_reflectance(vec3 f0, float roughness, float nv) {
 
 // Light that arrives at a surface.
 struct Light {
-  float sun;      // fraction of the sun that is visible
+  vec3 sun;       // fraction of the sun that is visible
   vec3 around;    // radiance of a white surface in the light of the sky and of other surfaces
   vec3 lamps;     // radiance of a white surface in the light of lamps
   float open;     // fraction of the sky's light that arrives

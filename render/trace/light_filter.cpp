@@ -189,8 +189,12 @@ void LightAverage::average_run(int x0, int y, int length, const Target& to) cons
       average_lanes<1>(x, y, to);
     else if (channels_ == 3)
       average_lanes<3>(x, y, to);
-    else
+    else if (channels_ == 4)
+      average_lanes<4>(x, y, to);
+    else if (channels_ == 7)
       average_lanes<7>(x, y, to);
+    else
+      average_lanes<10>(x, y, to);
   }
 }
 

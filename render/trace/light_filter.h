@@ -129,7 +129,7 @@ struct LightGuide {
 class LightValues {
  public:
   LightValues() = default;
-  /// `channels`: 1, 3 or 7.
+  /// `channels`: 1, 3, 4, 7 or 10.
   LightValues(int width_px, int height_px, std::size_t channels)
       : values_(channels, LightPlane(width_px, height_px)) {}
   std::span<LightPlane> channels() { return values_; }

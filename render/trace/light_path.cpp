@@ -7,6 +7,7 @@
 #include <tbb/parallel_for.h>
 
 #include "render/opacity_grid.h"
+#include "render/puff_light.h"
 #include "render/trace/air_field.h"
 #include "render/trace/air_light.h"
 
@@ -186,11 +187,10 @@ Vector3f LightTracer::sky_met(const Vector3f& direction, bool sharp, float densi
   return fraction * turned.intensity * turned.picture->seen(there);
 }
 
-float LightTracer::sun_visibility(const Vector3f& place, const SquarePoint<float>& uv) const {
-  const Sun& sun = sources_.sun;
-  float fraction = sources_.smoke != nullptr ? std::exp(-sources_.smoke->depth(place)) : 1.0f;
-  if (!sun.shadows) return fraction;
-  return fraction * scene_.transmittance(place, sun_disc_.direction(uv), kFar).mean();
+Vector3f LightTracer::sun_visibility(const Vector3f& place, const SquarePoint<float>& uv) const {
+  const float fraction = sources_.smoke != nullptr ? std::exp(-sources_.smoke->depth(place)) : 1.0f;
+  if (!sources_.sun.shadows) return Vector3f::Constant(fraction);
+  return fraction * scene_.transmittance(place, sun_disc_.direction(uv), kFar);
 }
 
 // Prepares particles for rays, before any ray is traced that can meet them. Computes their light.
@@ -203,26 +203,25 @@ void LightTracer::prepare_particles(MetParticles groups, const SampleOffsets& of
   if (balls.empty()) return;
   const AirField around(*this, offsets, balls, sources_.open_air);
   const AirLight air(scene_, sources_, offsets);
+  static const OpacityGrid no_smoke;
+  const SmokeLight smoke{sources_.smoke != nullptr ? *sources_.smoke : no_smoke, air, around,
+                         sources_.sky.sun_direction, sources_.sun.intensity * sources_.sun.color};
   for (RayParticleSet* set : sets) {
     set->light.resize(set->size());
     tbb::parallel_for(std::size_t{0}, set->size(), [&](std::size_t i) {
       const Vector3f place = set->center(i);
       const float radius = set->radius(i), number = set->numbers[i];
-      const float depth = sources_.smoke != nullptr ? sources_.smoke->depth(place) : 0.0f;
-      const float arrives = set->scattering == Scattering::puff
-                                ? sun_fraction_in_smoke(depth, set->colors[i].head<3>().maxCoeff())
-                                : std::exp(-depth);
-      set->light[i] << around.at(place).light.constant + air.lamps_around(place, radius, number),
-          arrives * air.sun(place, radius, number);
+      set->light[i] = set->scattering == Scattering::puff
+                          ? smoke.of_puff(place, radius, set->colors[i].head<3>(), number)
+                          : smoke.of_particle(set->scattering, place, radius, number);
     });
   }
 }
 
 // Adds the light of the particles on a segment of a path, and reduces its throughput.
 void LightTracer::meet_particles(float length, Path& path, FoundLight& found) const {
-  const ParticlesOnRay met = sources_.particles->along(
-      path.from, path.direction, length, path.particles,
-      {sources_.sky.sun_direction, sources_.sun.intensity * sources_.sun.color, sources_.fog});
+  const ParticlesOnRay met = sources_.particles->along(path.from, path.direction, length, path.particles,
+                                                       {sources_.sky.sun_direction, sources_.fog});
   (path.by_chance ? found.noisy : found.certain) += path.fraction.cwiseProduct(met.radiance);
   path.fraction *= met.transmittance;
 }
@@ -352,9 +351,11 @@ Vector3f LightTracer::highlight_of_sun(const Hit& hit, float roughness, const Ve
 Vector3f LightTracer::highlights(const Hit& hit, float roughness, const Vector3f& reflectance) const {
   Vector3f sum = highlight_of_sun(hit, roughness, reflectance);
   const Vector3f from = off_surface(hit.position, hit.face);
+  Hit by_lamps = hit;
+  by_lamps.normal = hit.lamp_normal;
   for (const RayLamp& lamp : sources_.lamps)
     if (!lamp.is_sky() && !lamp.def().in_mirrors)
-      sum += highlight(hit, lamp.point(from_eigen(from), {0.5f, 0.5f}), lamp.def().shadows, roughness,
+      sum += highlight(by_lamps, lamp.point(from_eigen(from), {0.5f, 0.5f}), lamp.def().shadows, roughness,
                        reflectance);
   return sum;
 }
@@ -366,9 +367,10 @@ LightTracer::DirectLight LightTracer::direct_light(const Hit& hit, const Vector3
   const float towards_sun = hit.normal.dot(sources_.sky.sun_direction);
   const SquarePoint<float> on_sun = sampler.next();
   if (towards_sun > 0 && sources_.sun.intensity > 0)
-    result.sun = sources_.sun.intensity * towards_sun * sun_visibility(from, on_sun) * sources_.sun.color;
-  result.lamps = lamps_at(from, hit.normal, hit.face, sampler);
-  result.glow = glow_at(from, hit.normal, hit.face, sampler);
+    result.sun = (sources_.sun.intensity * towards_sun * sun_visibility(from, on_sun))
+                     .cwiseProduct(sources_.sun.color);
+  result.lamps = lamps_at(from, hit.lamp_normal, hit.face, sampler);
+  result.glow = glow_at(from, hit.lamp_normal, hit.face, sampler);
   return result;
 }
 
@@ -467,7 +469,6 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
     (path.by_chance && path.density < 0 ? light.noisy : light.certain) +=
         path.fraction.cwiseProduct(radiance);
   };
-  float travelled = 0;
   bool sharp = path.cone < 0.1f;
   for (int step = 0; step < kMostSteps; ++step) {
     Hit hit;
@@ -488,7 +489,7 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
       add_source(visible->color(pixel));
       return light;
     }
-    travelled += hit.distance;
+    path.width += hit.distance * path.cone;
     if (sources_.fog > 0) {
       const float clear = std::exp(-sources_.fog * hit.distance);
       // In a picture, fog has the colour of the horizon in all directions, as in shaders/sky.glsl.
@@ -498,7 +499,7 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
       path.fraction *= clear;
     }
     const RayMaterial& material = *hit.material;
-    const RaySurface surface = material.surface(hit, travelled * path.cone, sharp);
+    const RaySurface surface = material.surface(hit, path.width, sharp);
     if (pixel < 0 && visible != nullptr && sharp && material.has_relief()) pixel = visible->find(hit);
     const Vector4f& color = surface.color;
     path.by_chance |= color.w() > 0 && color.w() < 1;
@@ -531,7 +532,7 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
     if (pixel >= 0) {
       const Vector4f& arriving = visible->arriving(pixel);
       const float cosine = hit.normal.dot(sources_.sky.sun_direction), through = hit.translucency;
-      const Vector3f sun = sources_.sun.intensity * arriving.w() * sources_.sun.color;
+      const Vector3f sun = (sources_.sun.intensity * visible->sun(pixel)).cwiseProduct(sources_.sun.color);
       const Vector3f from_front = response.around.cwiseProduct(arriving.head<3>()) +
                                   response.lamps.cwiseProduct(visible->lamps(pixel)) +
                                   std::max(cosine, 0.0f) * response.sun.cwiseProduct(sun);
@@ -542,13 +543,14 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
     }
     if (hit.translucency > 0 && sampler.next().x < hit.translucency) {  // light from the other side
       hit.normal = -hit.normal;
+      hit.lamp_normal = -hit.lamp_normal;
       hit.face = -hit.face;
       path.from = off_surface(hit.position, hit.face);
       response = Response::scattered(surface.transmitted);
     }
     if (response.lamps.isZero() && response.sun.isZero()) {
       sum += path.fraction.cwiseProduct(response.around)
-                 .cwiseProduct(glow_at(path.from, hit.normal, hit.face, sampler));
+                 .cwiseProduct(glow_at(path.from, hit.lamp_normal, hit.face, sampler));
     } else if (!sharp) {  // all fractions are equal
       sum += path.fraction.cwiseProduct(response.around)
                  .cwiseProduct(direct_light(hit, path.from, sampler).sum());

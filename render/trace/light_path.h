@@ -69,6 +69,7 @@ T power_heuristic(T a, T b) {
 struct LightTracer::Path {
   Vector3f from, direction;
   float cone;                     ///< angle of the cone of directions that the ray represents [rad]
+  float width = 0;                ///< width of the area that the ray represents at its origin [m]
   Vector3f fraction = {1, 1, 1};  ///< throughput of the path per channel
   bool mirrored = false;          ///< whether mirrors have reflected the path so far
   /// Whether the path shows a picture in a mirror or behind glass; false after a diffuse surface.

@@ -32,14 +32,6 @@ struct GlassPiece {
   bool contains(const Vector3f& place, float margin_m) const;
 };
 
-/// Light at a point in the air. A white surface there with the unit normal n has the radiance
-/// constant + slope * n.
-struct AirRadiance {
-  Vector3f constant = Vector3f::Zero();
-  Eigen::Matrix3f slope = Eigen::Matrix3f::Zero();  ///< rows: red, green, blue
-  Vector3f at(const Vector3f& normal) const { return (constant + slope * normal).cwiseMax(0.0f); }
-};
-
 struct LightSources {
   Sun sun;
   SkyModel sky;
@@ -48,6 +40,7 @@ struct LightSources {
   std::vector<RayLamp> lamps;
   Glow glow;
   std::vector<GlassPiece> glass;
+  bool sun_is_tinted = false;          ///< whether panes give the light of the sun another colour
   const OpacityGrid* smoke = nullptr;  ///< opacity of the smoke; null: there is no smoke
   RayParticles* particles = nullptr;   ///< the particles in mirror images; null: there are none
   AirRadiance open_air;                ///< light of the sky on particles, without objects

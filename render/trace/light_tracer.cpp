@@ -60,16 +60,19 @@ LightTracer::LightTracer(const RayScene& scene, const LightSources& sources, Sto
       stop_(std::move(stop)),
       sun_disc_(sources.sun, sources.sky.sun_direction) {}
 
+// Returns the mean over the channels; `colored` is set to each of them.
 Lanes LightTracer::sun_visibility(const LaneVectors& place, IntLanes active, const SquarePoint<Lanes>& uv,
-                                  RayScene::Focus focus) const {
+                                  RayScene::Focus focus, LaneVectors& colored) const {
   Lanes fraction = active ? Lanes{} + 1 : Lanes{};
   if (sources_.smoke != nullptr) {
     for (int i = 0; i < kLanes; ++i)
       if (active[i]) fraction[i] = std::exp(-sources_.smoke->depth({place.x[i], place.y[i], place.z[i]}));
   }
+  colored = {fraction, fraction, fraction};
   if (!sources_.sun.shadows) return fraction;
   const LaneVectors light =
       scene_.transmittance(place, sun_disc_.direction(uv), Lanes{} + kFar, active, focus);
+  colored = light * fraction;
   return fraction * ((light.x + light.y + light.z) * (1.0f / 3));
 }
 
@@ -129,10 +132,10 @@ void LightTracer::set_guide(const Points& points, int x, int y, const LightView&
   store(guide.normal, x, y, points.normal);
 }
 
-// Returns the visible fraction of the sun at eight pixels.
+// Returns the visible fraction of the sun at eight pixels, and sets `colored` to that of each channel.
 // `partly_hidden`, if not null, is set to whether the sun is visible from some of the pixels only.
 Lanes LightTracer::sun_at(const Points& points, const SquarePoint<Lanes>& on_sun, const LightView& view,
-                          bool* partly_hidden) const {
+                          LaneVectors& colored, bool* partly_hidden) const {
   const LaneVectors to_sun = all_lanes(sources_.sky.sun_direction);
   const Lanes towards_sun = dot(points.normal, to_sun);
   IntLanes sunny = points.visible & (towards_sun > 0.0f);
@@ -147,7 +150,7 @@ Lanes LightTracer::sun_at(const Points& points, const SquarePoint<Lanes>& on_sun
   }
   if (sources_.sun.intensity <= 0) sunny = IntLanes{};
   lift(points, sunny & ~points.cloth & (dot(points.face, to_sun) < kGrazing), view, place);
-  const Lanes fraction = sun_visibility(place, sunny, on_sun, view.focus);
+  const Lanes fraction = sun_visibility(place, sunny, on_sun, view.focus, colored);
   if (partly_hidden != nullptr) *partly_hidden = differs(fraction, sunny);
   return fraction;
 }
@@ -155,15 +158,21 @@ Lanes LightTracer::sun_at(const Points& points, const SquarePoint<Lanes>& on_sun
 // Traces the visible fraction of the sun for the pixels of a row of a sparse picture that are no gaps.
 void LightTracer::trace_sparse_sun(const SurfaceBuffer& surfaces, int y, const LightView& view,
                                    LightBuffer& light) const {
-  LightPlane& sun = light.direct.channels()[0];
+  const std::span<LightPlane> direct = light.direct.channels();
   IntLanes at = IntLanes{} - 1, columns{};
   int count = 0;
   const auto trace_collected = [&] {
     Sampler<UintLanes> sampler(reinterpret_cast<UintLanes>(columns) >> 1,
                                UintLanes{} + static_cast<uint32_t>(y), view.offsets.index,
                                view.offsets.count);
-    const Lanes fractions = sun_at(Points(surfaces, at), sampler.next(), view);
-    for (int i = 0; i < count; ++i) *sun.at(columns[i], y) = fractions[i];
+    LaneVectors colored;
+    const Lanes fractions = sun_at(Points(surfaces, at), sampler.next(), view, colored);
+    for (int i = 0; i < count; ++i) *direct[0].at(columns[i], y) = fractions[i];
+    for (int i = 0; i < count && sources_.sun_is_tinted; ++i) {
+      *direct.last(3)[0].at(columns[i], y) = colored.x[i];
+      *direct.last(3)[1].at(columns[i], y) = colored.y[i];
+      *direct.last(3)[2].at(columns[i], y) = colored.z[i];
+    }
     at = IntLanes{} - 1;
     count = 0;
   };
@@ -194,7 +203,15 @@ void LightTracer::trace_pixels(const SurfaceBuffer& surfaces, int x, int y, int 
   const SquarePoint<Lanes> on_sun = sampler.next();
   bool partly_hidden = false;
   const std::span<LightPlane> direct = light.direct.channels();
-  if (!view.sparse) add(direct[0], sun_at(points, on_sun, view, &partly_hidden));
+  if (!view.sparse) {
+    LaneVectors colored;
+    add(direct[0], sun_at(points, on_sun, view, colored, &partly_hidden));
+    if (sources_.sun_is_tinted) {
+      add(direct.last(3)[0], colored.x);
+      add(direct.last(3)[1], colored.y);
+      add(direct.last(3)[2], colored.z);
+    }
+  }
   if (!sources_.glow.empty() && round == 0)
     store(light.glow.channels(), x, y, trace_glow(points, x, y, view));
   if (!sources_.lamps.empty()) {
@@ -331,8 +348,10 @@ void LightTracer::refine_cells(const SurfaceBuffer& surfaces, const LightNoise& 
 }
 
 // Interpolates the light in the gaps of a sparse picture.
-void LightTracer::fill_sparse(LightBuffer& light) {
-  LightPlane* const sun[] = {&light.direct.channels()[0]};
+void LightTracer::fill_sparse(LightBuffer& light) const {
+  std::vector<LightPlane*> sun = {&light.direct.channels()[0]};
+  for (LightPlane& plane : light.direct.channels().last(sources_.sun_is_tinted ? 3 : 0))
+    sun.push_back(&plane);
   fill_gaps(Gaps::half, light.pixels, sun);
   const std::span<LightPlane> around = light.around.channels();
   LightPlane* const cells[] = {&around[0], &around[1], &around[2], &light.inverse_distance,
@@ -358,10 +377,11 @@ void LightTracer::trace_arriving(const SurfaceBuffer& surfaces, const LightView&
                                  LightBuffer& light) const {
   const int width = surfaces.width_px, height = surfaces.height_px;
   const std::size_t pixels = light.arriving.size(), with_lamps = sources_.lamps.empty() ? 0 : pixels;
-  const std::size_t channels = sources_.lamps.empty() ? 1 : 7;
+  const std::size_t channels = (sources_.lamps.empty() ? 1 : 7) + (sources_.sun_is_tinted ? 3 : 0);
   if (light.direct.channels().size() != channels) light.direct = LightValues(width, height, channels);
   light.lamps.resize(with_lamps);
   light.highlights.resize(with_lamps);
+  light.sun.resize(sources_.sun_is_tinted ? pixels : 0);
   const bool glows = !sources_.glow.empty();
   if (glows && light.glow.channels().empty()) light.glow = LightValues(width, height, 3);
   light.has_mirrors = std::ranges::any_of(surfaces.places,
@@ -411,6 +431,10 @@ void LightTracer::write_arriving(LightBuffer& light) const {
       light.lamps[pixel] << value(1, x), value(2, x), value(3, x), 0;
       light.highlights[pixel].head<3>() += Vector3f(value(4, x), value(5, x), value(6, x));
     }
+    const std::size_t colors = row.channels().size() - 3;
+    for (int x = 0; x < width && !light.sun.empty(); ++x)
+      light.sun[start + static_cast<std::size_t>(x)] << value(colors, x), value(colors + 1, x),
+          value(colors + 2, x), 0;
     if (!glow) return;
     row = LightValues(width, 1, 3);
     glow->write_row(y, row.channels(), 0);

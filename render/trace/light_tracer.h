@@ -34,6 +34,8 @@ struct LightBuffer {
   // Results, rows from the bottom up.
   std::vector<Vector4f>
       arriving;  ///< light from the sky and other surfaces; w: fraction of the sun that is visible
+  std::vector<Vector4f>
+      sun;  ///< visible fraction of the sun per channel; empty if it is equal for all channels
   std::vector<Vector4f> mirrored;    ///< light from the mirrored direction; w: 1 where it was computed
   bool has_mirrors = false;          ///< whether any surface mirrors; if not, `mirrored` is not updated
   std::vector<Vector4f> lamps;       ///< diffuse light of lamps; empty if there are no lamps
@@ -42,7 +44,8 @@ struct LightBuffer {
 
   // Intermediate values. Indirect light is traced per cell of 2x2 pixels.
   LightGuide pixels, cells;
-  /// For each pixel: visible fraction of the sun, diffuse light of lamps, and highlights of rough surfaces.
+  /// For each pixel: visible fraction of the sun; if there are lamps, their diffuse light and the highlights
+  /// of rough surfaces; if the sun is tinted, its visible fraction per channel.
   LightValues direct;
   LightValues glow;             ///< for each pixel: light of glowing meshes; empty if there are none
   LightValues around, mirrors;  ///< for each cell: diffuse indirect light, and mirrored light
@@ -93,6 +96,11 @@ class VisibleLight {
   /// Returns the light at the surface in a pixel from the sky and other surfaces; w: visible fraction of the
   /// sun.
   const Vector4f& arriving(int pixel) const { return light_.arriving[static_cast<std::size_t>(pixel)]; }
+  /// Returns the visible fraction of the sun at the surface in a pixel, per channel.
+  Vector3f sun(int pixel) const {
+    if (light_.sun.empty()) return Vector3f::Constant(arriving(pixel).w());
+    return light_.sun[static_cast<std::size_t>(pixel)].head<3>();
+  }
   /// Returns the light of lamps at the surface in a pixel.
   Vector3f lamps(int pixel) const;
 
@@ -165,9 +173,9 @@ class LightTracer {
   LaneVectors trace_glow(const Points& points, int x, int y, const LightView& view) const;
   Vector3f lamps_at(const Vector3f& place, const Vector3f& normal, const Vector3f& face,
                     PixelSampler& sampler) const;
-  float sun_visibility(const Vector3f& place, const SquarePoint<float>& uv) const;
+  Vector3f sun_visibility(const Vector3f& place, const SquarePoint<float>& uv) const;
   Lanes sun_visibility(const LaneVectors& place, IntLanes active, const SquarePoint<Lanes>& uv,
-                       RayScene::Focus focus) const;
+                       RayScene::Focus focus, LaneVectors& colored) const;
   FoundLight light_through(const Point& point, const LightView& view, PixelSampler& sampler,
                            const VisibleLight& visible, bool from_background) const;
   Vector3f mirrored_light(const Point& point, const LightView& view, PixelSampler& sampler,
@@ -187,10 +195,10 @@ class LightTracer {
                     LightBuffer& light) const;
   void refine_penumbras(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const;
   Lanes sun_at(const Points& points, const SquarePoint<Lanes>& on_sun, const LightView& view,
-               bool* partly_hidden = nullptr) const;
+               LaneVectors& colored, bool* partly_hidden = nullptr) const;
   void trace_sparse_sun(const SurfaceBuffer& surfaces, int y, const LightView& view,
                         LightBuffer& light) const;
-  static void fill_sparse(LightBuffer& light);
+  void fill_sparse(LightBuffer& light) const;
   static IntLanes pixels_of_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view);
   void trace_arriving(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const;
   void write_arriving(LightBuffer& light) const;

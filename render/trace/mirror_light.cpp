@@ -62,6 +62,7 @@ Vector3f LightTracer::mirrored_along(const Point& point, const Vector3f& facet, 
       .from = point.place,
       .direction = outgoing,
       .cone = std::max(a, view.pixel_m),
+      .width = view.pixel_m * (point.place - view.eye).norm(),
       .mirrored = true,
       .is_picture = true,
       .splits = splits,
@@ -124,11 +125,12 @@ LightTracer::FoundLight LightTracer::light_through(const Point& point, const Lig
   Path path{.from = view.eye - distance * point.view,
             .direction = -point.view,
             .cone = view.pixel_m,
+            .width = view.pixel_m * distance,
             .is_picture = true};
   path.from_background = from_background;
   Hit hit;
   if (!scene_.first_seen(path.from, path.direction, kFar, hit)) return radiance(path, sampler, &visible);
-  const RaySurface surface = hit.material->surface(hit, (hit.position - view.eye).norm() * path.cone, true);
+  const RaySurface surface = hit.material->surface(hit, path.width, true);
   path.fraction *= 1 - mirrored_fraction(hit, path.direction);
   path.by_chance = is_rough_glass(surface.roughness);
   path.fraction = path.fraction.cwiseProduct(
@@ -173,7 +175,8 @@ void LightTracer::trace_glass(const SurfaceBuffer& surfaces, int x0, int y0, con
             !sources_.sky_is_visible && behind.opacity(behind.pixel(x0 + x + i, y0 + y)) == 0;
         const FoundLight through = light_through(point, view, sampler, behind, from_background);
         glass.mirrored[pixel] << mirrored, through.background;
-        glass.through[pixel] << through.limited(sums), sunny ? sun_visibility(point.place, on_sun) : 0.0f;
+        glass.through[pixel] << through.limited(sums),
+            sunny ? sun_visibility(point.place, on_sun).mean() : 0.0f;
       }
     }
   });

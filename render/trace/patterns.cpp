@@ -35,12 +35,18 @@ struct Inputs {
   float footprint;
   vec3 dFdx(const vec3&) const { return vec3(0.577f * footprint); }
   vec3 dFdy(const vec3&) const { return vec3(0.577f * footprint); }
+  vec2 dFdx(const vec2&) const { return vec2(0.707f * footprint); }
+  vec2 dFdy(const vec2&) const { return vec2(0.707f * footprint); }
 };
 
 // Clang before version 16 does not initialize the members of a struct by parentheses.
 #define PatternSample(...) \
   PatternSample {          \
     __VA_ARGS__            \
+  }
+#define Threads(...) \
+  Threads {          \
+    __VA_ARGS__      \
   }
 
 struct Checker : Inputs {
@@ -109,6 +115,22 @@ struct Water : Inputs {
 #undef PATTERN
 };
 
+struct PlainWeave : Inputs {
+#define WEAVE 1
+#include "threads.inc"
+#undef WEAVE
+};
+struct Twill : Inputs {
+#define WEAVE 2
+#include "threads.inc"
+#undef WEAVE
+};
+struct Satin : Inputs {
+#define WEAVE 3
+#include "threads.inc"
+#undef WEAVE
+};
+
 }  // namespace glsl
 
 template <class Shader>
@@ -120,6 +142,14 @@ PatternPoint point_by(const glsl::Inputs& inputs, const Vector3f& position, cons
   return {{sample.color.x, sample.color.y, sample.color.z},
           sample.roughness,
           {sample.slope.x, sample.slope.y, sample.slope.z}};
+}
+
+template <class Shader>
+ThreadPoint threads_by(const glsl::Inputs& inputs, const Vector2f& place) {
+  Shader shader;
+  static_cast<glsl::Inputs&>(shader) = inputs;
+  const auto threads = shader.threads(glsl::vec2(place.x(), place.y()));
+  return {threads.shade, {threads.slope.x, threads.slope.y}};
 }
 
 }  // namespace
@@ -176,6 +206,25 @@ PatternPoint pattern_point(const PatternDef& def, const Vector3f& position, cons
       return point_by<glsl::Water>(inputs, position, normal);
   }
   return {.color = color};
+}
+
+ThreadPoint thread_point(const Fabric& fabric, const Vector2f& place, float footprint) {
+  const glsl::Inputs inputs{
+      {}, {{}, {}, glsl::vec4(0, 0, fabric.thread, fabric.relief)}, footprint / fabric.thread};
+  switch (fabric.weave) {
+    case Weave::none:
+      return {};
+    case Weave::plain:
+      static_assert(static_cast<int>(Weave::plain) == 1);
+      return threads_by<glsl::PlainWeave>(inputs, place);
+    case Weave::twill:
+      static_assert(static_cast<int>(Weave::twill) == 2);
+      return threads_by<glsl::Twill>(inputs, place);
+    case Weave::satin:
+      static_assert(static_cast<int>(Weave::satin) == 3);
+      return threads_by<glsl::Satin>(inputs, place);
+  }
+  return {};
 }
 
 }  // namespace offstage::render

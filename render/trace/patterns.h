@@ -1,5 +1,6 @@
 #pragma once
-/// Private: the procedural patterns of shaders/pattern.glsl on the CPU, compiled from the same source.
+/// Private: the procedural patterns of shaders/pattern.glsl and the threads of shaders/threads.glsl on the
+/// CPU, compiled from the same source.
 
 #include "render/model.h"
 
@@ -23,5 +24,15 @@ struct PatternDef {
 /// object's units. `time`: of the ripples of water [s].
 PatternPoint pattern_point(const PatternDef& def, const Vector3f& position, const Vector3f& normal,
                            float footprint, float time);
+
+/// Threads of a fabric at a point, as Threads in shaders/threads.glsl.
+struct ThreadPoint {
+  float shade = 1;                    ///< factor of the colour
+  Vector2f slope = Vector2f::Zero();  ///< gradient of the height, along weft and warp
+};
+
+/// Returns the threads of a fabric at a place [m] along weft and warp. `footprint`: width of the area that is
+/// averaged [m].
+ThreadPoint thread_point(const Fabric& fabric, const Vector2f& place, float footprint);
 
 }  // namespace offstage::render

@@ -10,8 +10,10 @@
 namespace offstage::render {
 namespace {
 
-constexpr float kMeanCells = 2;    // footprint, in cells of a pattern, from which on its mean is used
-constexpr int kMostTexels = 1024;  // width of the copy of a texture
+constexpr float kMeanCells = 2;           // footprint, in cells of a pattern, from which on its mean is used
+constexpr float kMeanThreads = 3;         // footprint, in threads, from which on their mean is used
+constexpr float kMirrorRoughness = 0.3f;  // see kSmooth in mesh_pass.cpp
+constexpr int kMostTexels = 1024;         // width of the copy of a texture
 
 const std::array<float, 256>& linear_values() {
   static const std::array<float, 256> table = [] {
@@ -85,12 +87,13 @@ RayMaterial::RayMaterial(const Material& material, std::span<const Image> textur
       emission_(material.emission),
       pattern_{material.pattern, material.color.head<3>(), material.pattern_color,
                std::max(material.pattern_scale, 1e-4f), material.roughness},
-      back_color_(material.fabric.back_color),
+      fabric_(material.fabric),
       alpha_cutoff_(material.alpha_cutoff),
       triplanar_(material.triplanar),
       texels_(material.base_color_texture, textures, Content::color),
       glowing_texels_(material.emission.isZero() ? TextureMap{} : material.emission_texture, textures,
                       Content::color) {
+  fabric_.thread = std::max(fabric_.thread, 1e-6f);
   mean_color_ = pattern_point(pattern_, Vector3f::Zero(), Vector3f::UnitY(), 1e3f * pattern_.scale, 0).color;
   mean_emission_ = emission_.cwiseProduct(glowing_texels_.mean.head<3>());
   opaque_ = material.color.w() >= 1 && !material.vertex_alpha && transmission <= 0 && texels_.mean.w() >= 1;
@@ -148,14 +151,15 @@ Vector4f RayMaterial::textured(const Vector3f& color, const Hit& hit) const {
   return result;
 }
 
-// As main() in shaders/cloth.frag. Light that the cloth transmits has a more saturated colour, because it has
-// travelled farther in it.
-void RayMaterial::add_fabric(const Hit& hit, RaySurface& surface) const {
+// As main() in shaders/cloth.frag. `shade`: of the threads. Light that the cloth transmits has a more
+// saturated colour, because it has travelled farther in it.
+void RayMaterial::add_fabric(const Hit& hit, float shade, RaySurface& surface) const {
   surface.transmitted = surface.color.head<3>();
-  if (back_color_) {
-    surface.transmitted = surface.transmitted.cwiseProduct(*back_color_).cwiseSqrt();
-    if (!hit.front) surface.color.head<3>() = *back_color_;
+  if (const std::optional<Vector3f>& back = fabric_.back_color) {
+    surface.transmitted = surface.transmitted.cwiseProduct(*back).cwiseSqrt();
+    if (!hit.front) surface.color.head<3>() = *back;
   }
+  surface.color.head<3>() *= shade;
   const Vector3f albedo = surface.color.head<3>();
   surface.transmitted = surface.transmitted.cwiseProduct(albedo / std::max(albedo.maxCoeff(), 1e-3f));
 }
@@ -179,12 +183,18 @@ RaySurface RayMaterial::surface(Hit& hit, float footprint, bool relief) const {
   } else {
     result.color = color(hit, footprint);
   }
-  if (hit.is_cloth)
-    add_fabric(hit, result);
-  else if (details_)
+  if (hit.is_cloth) {
+    ThreadPoint threads;
+    if (relief && has_threads() && footprint <= kMeanThreads * fabric_.thread)
+      threads = thread_point(fabric_, hit.object_position.head<2>(),
+                             footprint / std::max(-hit.face.dot(hit.direction), 0.1f));
+    add_fabric(hit, threads.shade, result);
+    slope.head<2>() += threads.slope;
+  } else if (details_) {
     add_details(hit, result);
-  hit.smooth_normal = hit.normal;
-  if (relief && has_relief()) add_relief(slope, hit);
+  }
+  hit.smooth_normal = hit.lamp_normal = hit.normal;
+  if (relief && (has_relief() || !slope.isZero())) add_relief(slope, hit);
   return result;
 }
 
@@ -212,8 +222,8 @@ void RayMaterial::add_details(const Hit& hit, RaySurface& surface) const {
   if (details.transmission.image) surface.transmission *= details.transmission.at(hit.uvs).x();
 }
 
-// Tilts the normal by a pattern's slope or by the normal map, as main() and mapped_normal() in
-// shaders/mesh.frag.
+// Tilts the normal by the slope of a pattern or of threads, or by the normal map, as main() and
+// mapped_normal() in shaders/mesh.frag, and main() in shaders/cloth.frag.
 void RayMaterial::add_relief(const Vector3f& slope, Hit& hit) const {
   Vector3f normal = hit.normal;
   if (normal_map() != nullptr) {
@@ -221,11 +231,17 @@ void RayMaterial::add_relief(const Vector3f& slope, Hit& hit) const {
     const Vector3f tilt = texel.x() * hit.along_u + texel.y() * hit.against_v;
     normal = (hit.front ? details_->normal_scale : -details_->normal_scale) * tilt +
              std::max(texel.z(), 0.01f) * normal;
+  } else if (hit.is_cloth) {
+    normal -= (hit.front ? 1.0f : -1.0f) * (slope.x() * hit.along_u - slope.y() * hit.against_v);
   } else if (hit.world_from_object != nullptr) {
     normal -= hit.world_from_object->linear().colwise().normalized() * slope;
   }
   hit.normal = normal.normalized();
   hit.turn_normal_to(-hit.direction);
+  // The pass of surfaces, see MeshPass::surface_program(), draws the relief of patterns only on smooth
+  // materials.
+  const bool is_smooth = roughness < kMirrorRoughness || metallic > 0.5f;
+  if (normal_map() != nullptr || (is_smooth && !hit.is_cloth)) hit.lamp_normal = hit.normal;
 }
 
 bool RayMaterial::is_tinted() const {

@@ -4,7 +4,6 @@
 
 #include <array>
 #include <memory>
-#include <optional>
 #include <span>
 
 #include "render/model.h"
@@ -48,6 +47,8 @@ class RayMaterial {
   const TextureMap* normal_map() const;
   /// Returns whether the surface has a normal map or the relief of a pattern.
   bool has_relief() const { return has_pattern() || normal_map() != nullptr; }
+  /// Returns whether a cloth of this material has threads.
+  bool has_threads() const { return fabric_.weave != Weave::none && fabric_.relief > 0; }
   /// Returns the radiance that the surface emits. `uvs`: both sets of texture coordinates of the point.
   Vector3f emission_at(const std::array<Vector2f, 2>& uvs) const;
   /// Returns the mean of the emitted radiance over the texture.
@@ -86,7 +87,7 @@ class RayMaterial {
   bool has_pattern() const { return pattern_.pattern != Pattern::none; }
   Vector4f triplanar_texel(const Vector3f& place, const Vector3f& normal) const;
   Vector4f textured(const Vector3f& color, const Hit& hit) const;
-  void add_fabric(const Hit& hit, RaySurface& surface) const;
+  void add_fabric(const Hit& hit, float shade, RaySurface& surface) const;
   void add_details(const Hit& hit, RaySurface& surface) const;
   void add_relief(const Vector3f& slope, Hit& hit) const;
 
@@ -94,7 +95,7 @@ class RayMaterial {
   Vector3f emission_, mean_emission_;
   PatternDef pattern_;
   Vector3f mean_color_;
-  std::optional<Vector3f> back_color_;  ///< cloth: see Fabric
+  Fabric fabric_;
   float alpha_cutoff_ = 0;
   bool opaque_ = true, triplanar_ = false;
   Texels texels_, glowing_texels_;

@@ -11,6 +11,7 @@ namespace offstage::render {
 namespace {
 
 constexpr int kMostOnRay = 128;      // particles on a segment; the farther ones are left out
+constexpr float kFlake = 0.88f;      // radius of a disc with the area of a flake, see shaders/points.frag
 constexpr float kDark = 1.0f / 256;  // transmittance below which nothing behind is visible
 
 // Equal to coverage() in shaders/points_shape.glsl.
@@ -19,32 +20,46 @@ float coverage(float across, float softness) {
   return 1 - x * x * (3 - 2 * x);
 }
 
+/// Returns the part of a vector that is perpendicular to a ray.
+Vector3f across(const Vector3f& v, const Vector3f& direction) {
+  return v - v.dot(direction) * direction;
+}
+
 /// Returns the opacity of a particle for a ray, as a fraction of the opacity in its middle.
 float opacity_on_ray(const RayParticleSet& set, std::size_t i, const Vector3f& from,
                      const Vector3f& direction) {
-  const auto across = [&](const Vector3f& v) -> Vector3f { return v - v.dot(direction) * direction; };
   if (!set.lines) {
     const Vector4f& disc = set.places[i];
-    return coverage(across(disc.head<3>() - from).norm() / disc.w(), set.softness);
+    const float shape = set.scattering == Scattering::flake ? kFlake : 1.0f;
+    return coverage(across(disc.head<3>() - from, direction).norm() / (shape * disc.w()), set.softness);
   }
   // t: the point of the axis that is nearest to the ray, from the head (0) to the tail (1).
   const Vector4f &head = set.places[2 * i], &tail = set.places[2 * i + 1];
-  const Vector3f axis = across((tail - head).head<3>()), to_head = across(head.head<3>() - from);
+  const Vector3f axis = across((tail - head).head<3>(), direction),
+                 to_head = across(head.head<3>() - from, direction);
   const float length2 = axis.squaredNorm();
   const float t = length2 > 0 ? std::clamp(-to_head.dot(axis) / length2, 0.0f, 1.0f) : 0.5f;
   return coverage((to_head + t * axis).norm() / head.w(), set.softness) * (1 - set.taper * t);
 }
 
+/// Returns the normal of a particle's surface on a ray; zero for drops. That of sprites is interpolated from
+/// the corners of their quads, as in shaders/points.vert, and is therefore shorter.
+Vector3f normal_on_ray(const RayParticleSet& set, std::size_t i, const Vector3f& from,
+                       const Vector3f& direction) {
+  if (set.scattering == Scattering::flake) return {0, 0.5f, 0};
+  if (set.lines) return Vector3f::Zero();
+  const Vector4f& disc = set.places[i];
+  const Vector3f normal = across(from - disc.head<3>(), direction) / disc.w() - 0.7f * direction;
+  return set.scattering == Scattering::sprite ? Vector3f(normal / std::sqrt(2.49f)) : normal.normalized();
+}
+
 }  // namespace
 
-float scattered_fraction(Scattering scattering, float cosine) {
-  if (scattering == Scattering::drop) {
-    const float forward = 0.5f + 0.5f * cosine, forward2 = forward * forward;
-    return 0.12f + 0.9f * (forward2 * forward2 * forward2 * forward2);
-  }
-  const float forward = std::max(cosine, 0.0f), forward2 = forward * forward, forward4 = forward2 * forward2;
-  if (scattering == Scattering::puff) return 0.68f + 0.9f * forward4 * forward2;
-  return (scattering == Scattering::sprite ? 0.45f : 0.4f) + 0.8f * forward4;
+float forward_lobe(Scattering scattering, float cosine) {
+  const float forward = scattering == Scattering::drop ? 0.5f + 0.5f * cosine : std::max(cosine, 0.0f);
+  const float forward2 = forward * forward, forward4 = forward2 * forward2;
+  if (scattering == Scattering::drop) return forward4 * forward4;
+  return scattering == Scattering::puff ? forward4 * forward2 : forward4;
 }
 
 void RayParticles::reset(std::function<std::vector<RayParticleSet>()> make) {
@@ -117,9 +132,8 @@ ParticlesOnRay RayParticles::along(const Vector3f& from, const Vector3f& directi
     const float opacity = std::min(set.colors[i].w(), 1.0f) * opacity_on_ray(set, i, from, direction);
     Vector3f radiance = set.colors[i].head<3>();
     if (set.scattering != Scattering::none)
-      radiance = radiance.cwiseProduct(set.light[i].head<3>() +
-                                       set.light[i].w() * scattered_fraction(set.scattering, towards_sun) *
-                                           air.sun_radiance);
+      radiance = radiance.cwiseProduct(set.light[i].diffuse.at(normal_on_ray(set, i, from, direction)) +
+                                       forward_lobe(set.scattering, towards_sun) * set.light[i].forward);
     found.radiance += found.transmittance * opacity * std::exp(-air.fog * ray.ray.tfar) * radiance;
     found.transmittance *= 1 - set.cover * opacity;
   }

@@ -15,11 +15,24 @@ namespace offstage::render {
 /// How particles scatter light. `none`: they are not lit, and their colour is their radiance.
 enum class Scattering { none, puff, sprite, flake, drop };
 
-/// Returns the fraction of the sun's light that a particle scatters along a ray to the eye. `cosine`: of the
-/// angle between the direction in which the ray is traced and the direction to the sun. For sprites and
-/// flakes equal to the factors in shaders/points.vert, for puffs to those of light that smoke does not absorb
-/// in PuffLight, both without the effect of the direction of their surface.
-float scattered_fraction(Scattering scattering, float cosine);
+/// Light at a point in the air. A white surface there with the unit normal n has the radiance
+/// constant + slope * n.
+struct AirRadiance {
+  Vector3f constant = Vector3f::Zero();
+  Eigen::Matrix3f slope = Eigen::Matrix3f::Zero();  ///< rows: red, green, blue
+  Vector3f at(const Vector3f& normal) const { return (constant + slope * normal).cwiseMax(0.0f); }
+};
+
+/// Light that a white particle scatters.
+struct ParticleLight {
+  AirRadiance diffuse;                  ///< as a function of the normal of its surface
+  Vector3f forward = Vector3f::Zero();  ///< radiance in the direction of the sun's rays, times forward_lobe()
+};
+
+/// Returns the light that a particle scatters to the eye, as a fraction of that in the direction of the sun's
+/// rays. `cosine`: of the angle between the direction in which the ray is traced and the direction to the
+/// sun.
+float forward_lobe(Scattering scattering, float cosine);
 
 /// Groups of particles that a ray meets. Drops are too small to be visible in blurred mirror images.
 enum class MetParticles { none, no_drops, all };
@@ -35,8 +48,7 @@ struct RayParticleSet {
   Scattering scattering = Scattering::none;
   float cover = 1;  ///< opacity against the background, as a fraction; 0: particles add light
   float softness = 0.5f, taper = 0;  ///< see PointsDef; softness is positive
-  /// For each lit particle: light of lamps and from around on it; w: fraction of the sun that arrives.
-  std::vector<Vector4f> light;
+  std::vector<ParticleLight> light;  ///< for each lit particle
 
   std::size_t size() const { return colors.size(); }
   Vector3f center(std::size_t i) const {
@@ -47,7 +59,7 @@ struct RayParticleSet {
 
 /// The light between particles.
 struct ParticleAir {
-  Vector3f to_sun, sun_radiance;
+  Vector3f to_sun;
   float fog;  ///< density [1/m]
 };
 

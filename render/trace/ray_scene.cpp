@@ -55,6 +55,20 @@ Vector2f barycentric(const Vector3f& from, const Vector3f& direction, const Vect
   return {u, v};
 }
 
+/// Sets the directions of a normal map from the gradients of the texture coordinates on a triangle. `ab`,
+/// `ac`: edges of the triangle; `uv_ab`, `uv_ac`: changes of the coordinates along them.
+void set_gradients(const Vector3f& ab, const Vector3f& ac, const Vector2f& uv_ab, const Vector2f& uv_ac,
+                   Hit& hit) {
+  const float side = hit.normal.dot(ab.cross(ac)) < 0 ? -1.0f : 1.0f;
+  const Vector3f a = side * ac.cross(hit.normal), b = side * hit.normal.cross(ab);
+  hit.along_u = a * uv_ab.x() + b * uv_ac.x();
+  hit.against_v = -(a * uv_ab.y() + b * uv_ac.y());
+  const float size =
+      1 / std::sqrt(std::max({hit.along_u.squaredNorm(), hit.against_v.squaredNorm(), 1e-30f}));
+  hit.along_u *= size;
+  hit.against_v *= size;
+}
+
 template <class T>
 T mixed(const T& a, const T& b, const T& c, const Vector2f& uv) {
   return (1 - uv.x() - uv.y()) * a + uv.x() * b + uv.y() * c;
@@ -340,15 +354,7 @@ void RayScene::Object::describe_tangents(const TextureMap& map, unsigned triangl
     const Vector3f uv = mesh->uv_of(k[i], map.uv_set).homogeneous();
     return {map.rows[0].dot(uv), map.rows[1].dot(uv)};
   };
-  const Vector2f along_ab = place(1) - place(0), along_ac = place(2) - place(0);
-  const float side = n.dot(ab.cross(ac)) < 0 ? -1.0f : 1.0f;
-  const Vector3f a = side * ac.cross(n), b = side * n.cross(ab);
-  hit.along_u = a * along_ab.x() + b * along_ac.x();
-  hit.against_v = -(a * along_ab.y() + b * along_ac.y());
-  const float size =
-      1 / std::sqrt(std::max({hit.along_u.squaredNorm(), hit.against_v.squaredNorm(), 1e-30f}));
-  hit.along_u *= size;
-  hit.against_v *= size;
+  set_gradients(ab, ac, place(1) - place(0), place(2) - place(0), hit);
 }
 
 // The result is the mean of three projections of the point, onto the planes through the corners that are
@@ -388,6 +394,8 @@ void RayScene::Object::describe_cloth(unsigned triangle, const Vector3f& from, c
   hit.object_position = {along.x(), along.y(), 0};
   hit.object_normal = Vector3f::UnitZ();
   hit.uvs[0] = hit.uvs[1] = along.cwiseProduct(texture_from_uv);
+  if (material->has_relief() || material->has_threads())
+    set_gradients(b.position - a.position, c.position - a.position, b.uv - a.uv, c.uv - a.uv, hit);
 }
 
 void RayScene::Object::describe_ball(unsigned ball, const Vector3f& from, const Vector3f& direction,

@@ -67,6 +67,7 @@ struct Hit {
   Vector3f position = Vector3f::Zero();
   Vector3f normal = Vector3f::Zero();         ///< smooth unit normal, on the side of the ray's origin
   Vector3f smooth_normal = Vector3f::Zero();  ///< the same without the relief of the material
+  Vector3f lamp_normal = Vector3f::Zero();    ///< the same as the shaders use it for lamps and glowing meshes
   Vector3f face = Vector3f::Zero();  ///< unit normal of the triangle, on the side of the ray's origin
   bool front = true;                 ///< whether the ray hits the front of the surface
   const RayMaterial* material = nullptr;
@@ -81,7 +82,8 @@ struct Hit {
   std::array<Vector2f, 2> uvs = {Vector2f(0, 0), Vector2f(0, 0)};  ///< both sets of texture coordinates
   Vector4f color = {1, 1, 1, 1};                                   ///< interpolated colour of the vertices
   Vector3f direction = Vector3f::Zero();                           ///< unit direction of the ray
-  /// Directions of X and Y of a normal map, if the material has one; zero without texture coordinates.
+  /// Directions of X and Y of a normal map, or of u and against v on a cloth with relief; zero without
+  /// texture coordinates.
   Vector3f along_u = Vector3f::Zero(), against_v = Vector3f::Zero();
 
   /// Tilts the normal if it faces away from a direction. Smooth normals and relief can do so at outlines.
