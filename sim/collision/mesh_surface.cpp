@@ -16,8 +16,6 @@ constexpr int kMostSlivers = 16;
 /// A normal outside of a region by less than this sine counts as inside, because normals are not more
 /// accurate.
 constexpr Real kOff = 1e-5;
-/// A direction runs along a triangle if its sine to the triangle's plane is at most this.
-constexpr Real kAlong = 0.01;
 /// Points count as on an edge or a vertex if they are nearer to it than this fraction of the longest edge.
 constexpr Real kOnFeature = 1e-6;
 
@@ -94,7 +92,13 @@ Real SurfaceTriangle::fall(std::size_t k) const {
 }
 
 SurfaceTriangle SurfaceTriangle::neighbour(std::size_t k) const {
-  return {mesh, mesh->surface.across(face)[k], side};
+  const uint32_t next = mesh->surface.across(face)[k];
+  const Triangle &own = mesh->mesh.triangles[face], &other = mesh->mesh.triangles[next];
+  // Triangles of the same winding pass their common edge in opposite directions.
+  bool is_turned = false;
+  for (std::size_t i = 0; i < 3; ++i)
+    is_turned |= other[i] == own[k] && other[(i + 1) % 3] == own[(k + 1) % 3];
+  return {mesh, next, is_turned ? -side : side};
 }
 
 bool SurfaceTriangle::edge_allows(std::size_t k, const Vec3& n, Real guard) const {
@@ -139,7 +143,7 @@ Real SurfaceTriangle::near2() const {
 bool SurfaceTriangle::runs_along_neighbour(const Vec3& point, const Vec3& n) const {
   for (std::size_t k = 0; k < 3; ++k) {
     const uint32_t next = mesh->surface.across(face)[k];
-    if (next == kNoFace || std::abs(n.dot(mesh->topology.face_normal(next))) > kAlong) continue;
+    if (next == kNoFace || std::abs(n.dot(mesh->topology.face_normal(next))) > kAlongside) continue;
     const Vec3 edge = corner(k + 1) - corner(k), arm = point - corner(k);
     if (edge.cross(arm).squaredNorm() > near2() * edge.squaredNorm()) continue;
     if (n.dot(inward(mesh->mesh, next, corner(k), corner(k + 1))) > 0) return true;

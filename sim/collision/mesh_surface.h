@@ -34,6 +34,9 @@ class MeshSurface {
 
 class CollisionMesh;
 
+/// A direction runs along a triangle if its sine to the triangle's plane is at most this.
+constexpr Real kAlongside = 0.01;
+
 /// One side of a triangle of a mesh.
 struct SurfaceTriangle {
   const CollisionMesh* mesh = nullptr;
@@ -47,7 +50,8 @@ struct SurfaceTriangle {
   /// Slope of the neighbouring triangle across the edge (k, k + 1): sine of its angle below this triangle's
   /// plane. Positive at a ridge, negative in a valley, 0 if the surface is flat or ends at the edge.
   Real fall(std::size_t k) const;
-  /// The triangle across the edge (k, k + 1), on the same side. The surface must not end there.
+  /// The triangle across the edge (k, k + 1), on the same side of the surface, whatever its winding. The
+  /// surface must not end there.
   SurfaceTriangle neighbour(std::size_t k) const;
   /// Whether a contact at a point of the triangle can push along the unit vector `n` on this side. `guard`, 0
   /// to 1, also allows normals slightly outside of the region of a ridge: by up to this fraction of its

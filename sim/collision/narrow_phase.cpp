@@ -20,7 +20,8 @@ namespace {
 constexpr Real kLeastTriangleDistance = 1e-9;
 /// A PairCache with at most this number of entries is searched linearly.
 constexpr std::size_t kFewEntries = 8;
-/// Greatest number of triangles around a triangle whose sides decide about its side.
+/// Greatest number of triangles, itself included, that are searched for the side of a triangle: a few rings
+/// around a strip such as a riser.
 constexpr std::size_t kMostSearched = 12;
 constexpr uint32_t kNoEntry = ~0u;
 
@@ -90,18 +91,21 @@ Separation plane_separation(const Convex& a, const Pose& a_from_plane) {
 }
 
 /// Returns the side of a triangle on which a piece is that does not show it. It is the previous side if this
-/// is known, or else the side known for the nearest of kMostSearched triangles around it, or else that of the
-/// sign of `guess`.
+/// is known, or else the side known for the triangle that is the fewest edges away, or else that of the sign
+/// of `guess`.
 template <class SideOfFace>
 int unseen_side(const SurfaceTriangle& t, Real guess, int before, SideOfFace&& side_of_face) {
   if (before != 0) return before;
-  std::array<uint32_t, kMostSearched> searched = {t.face};
+  // The side of each triangle that continues the front of `t`.
+  std::array<SurfaceTriangle, kMostSearched> searched = {SurfaceTriangle{t.mesh, t.face, 1}};
   for (std::size_t done = 0, count = 1; done < count; ++done)
-    for (const uint32_t next : t.mesh->surface.across(searched[done])) {
+    for (std::size_t k = 0; k < 3 && count < kMostSearched; ++k) {
+      if (t.mesh->surface.across(searched[done].face)[k] == kNoFace) continue;
+      const SurfaceTriangle next = searched[done].neighbour(k);
       const auto end = searched.begin() + static_cast<std::ptrdiff_t>(count);
-      if (next == kNoFace || count == kMostSearched || std::find(searched.begin(), end, next) != end)
+      if (std::any_of(searched.begin(), end, [&](const SurfaceTriangle& s) { return s.face == next.face; }))
         continue;
-      if (const int side = side_of_face(next)) return side;
+      if (const int side = side_of_face(next.face)) return side * next.side;
       searched[count++] = next;
     }
   return guess >= 0 ? 1 : -1;
@@ -121,7 +125,7 @@ int unseen_side(const SurfaceTriangle& t, Real guess, int before, SideOfFace&& s
 template <class SideOfFace>
 int set_side(SurfaceTriangle& t, Real distance, const Vec3& outward, const Vec3& point, const Vec3& middle,
              int before, SideOfFace&& side_of_face) {
-  constexpr Real kAlongside = 0.01, kFacing = 0.5, kNearBorder = 1e-4;
+  constexpr Real kFacing = 0.5, kNearBorder = 1e-4;
   const Vec3 front = t.normal();
   const Real lean = outward.dot(front), height = front.dot(middle - t.corner(0));
   const bool is_beside = distance > 0 && std::abs(lean) <= kAlongside;

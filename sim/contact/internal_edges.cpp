@@ -153,13 +153,13 @@ class BodyContacts {
       }
       const auto face = std::find_if(faces_.begin(), faces_.end(),
                                      [&](const View* f) { return keeps_apart(*f, views_[i]); });
-      if (std::ranges::any_of(faces_, [&](const View* f) { return passes_over(*f, views_[i]); })) {
-        verdicts.push_back({views_[i].pair, views_[i].index, {}});
-        continue;
-      }
       if (face != faces_.end()) {
         verdicts.push_back({views_[i].pair, views_[i].index, {}});
         if (!views_[i].speculative) verdicts.back().instead = upright(views_[i], **face);
+        continue;
+      }
+      if (std::ranges::any_of(faces_, [&](const View* f) { return passes_over(*f, views_[i]); })) {
+        verdicts.push_back({views_[i].pair, views_[i].index, {}});
         continue;
       }
       if (!views_[i].may_be_at_internal_edge()) continue;

@@ -55,6 +55,7 @@ void ClothObstacles::add(std::span<const Vec3> from, std::span<const Vec3> to,
   inverse_mass_.insert(inverse_mass_.end(), inverse_masses.begin(), inverse_masses.end());
   holder_.resize(from_.size(), kNone);
   for (const Pin& pin : pins) {
+    if (holder_[first + pin.point] != kNone) continue;  // pinned twice
     Holder& holder = holders_[pin.holder];
     holder_[first + pin.point] = pin.holder;
     const PointVelocity E = point_velocity(to[pin.point] - holder.body.centre_at(1));

@@ -29,6 +29,9 @@ class ParticleCollisions {
   void step(std::span<ParticleSystem* const> systems, const ParticleStage& stage, ImpactLaw law,
             Real collision_speed, uint32_t lcp_cluster = 0);
 
+  /// Forgets the contacts of the last sub-step. Call it in a sub-step without step().
+  void forget() { known_.clear(); }
+
   /// Work of pivoting on contacts in the last step.
   const ContactWork& lcp_work() const { return contacts_.lcp_work(); }
 
@@ -61,7 +64,7 @@ class ParticleCollisions {
   std::vector<Vec3> free_end_, end_, places_;
   std::vector<uint32_t> source_of_, members_, layer_, layer_begin_, before_;
   std::vector<uint8_t> touched_;
-  std::vector<Known> known_;
+  std::vector<Known> known_;  // the particles of the last sub-step
   std::vector<ParticleStrike> strikes_;
   std::vector<Reaction> reactions_;
   NeighborGrid order_;

@@ -21,8 +21,9 @@ constexpr Real kStepsBefore = 120, kMostStepsBefore = 10000;
 /// Greatest number of hits on cloth in a sub-step, for particles that collide with particles.
 constexpr int kMostClothHits = 8;
 /// Particles at a distance from a body of less than this fraction of their radius may touch it, because
-/// impulses may close the gap. It is greater than ParticleContacts::kMargin.
+/// impulses may close the gap.
 constexpr Real kNear = 0.2;
+static_assert(kNear > ParticleContacts::kMargin);
 /// Durations below this are rounding errors [s].
 constexpr Real kRounding = 1e-11;
 
@@ -265,6 +266,10 @@ void ParticleSystem::find_on_bodies(const ParticleStage& stage) {
     for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) {
       const Vec3& end = arrays.position[i];
       if (!(duration_[i] > 0) || !end.allFinite() || !arrays.velocity[i].allFinite()) continue;
+      // Cloth may stop the particle before it reaches a body, so it must be met in the order of time.
+      const Real from = 1 - duration_[i] / stage.h;
+      if (!stage.cloths.empty() && stage.cloths.first_hit(start_position_[i], end, arrays.radius[i], from, 1))
+        continue;
       near.find(start_position_[i], end, (1 + kNear) * arrays.radius[i]);
       is_on_body_[i] = std::ranges::any_of(near.all(), [](const Obstacle* o) { return o->is_dynamic(); });
     }

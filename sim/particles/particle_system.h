@@ -62,7 +62,8 @@ struct ParticleSystem {
   bool hits_particles() const { return def.internal || def.external || def.rotates; }
   /// Whether particles of a system that does not collide with particles may rest on bodies.
   bool may_rest() const { return !hits_particles() && def.collides && !def.dies_on_hit; }
-  /// Box around the paths of the particles in the next sub-step of length h [s].
+  /// Box around the paths of the particles in the next sub-step of length h [s], if no force changes a
+  /// velocity by more than itself plus 2 h `gravity`.
   Aabb reach(Real h, const Vec3& gravity) const;
   /// For a system that may_rest(), after fly_all(): finds the particles that may touch dynamic bodies in this
   /// sub-step. ParticleCollisions resolves their collisions, too, because particles that rest on a body and

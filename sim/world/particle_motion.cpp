@@ -125,23 +125,26 @@ void ParticleMotion::return_cloths() {
 /// together. Returns the work of the solver.
 ContactWork ParticleMotion::collide(const ParticleStage& stage, const CoupledSystem& coupled) {
   colliding_.clear();
-  std::vector<Aabb> dynamic;  // boxes of the bodies that particles may move
-  for (const std::span<const Obstacle> obstacles : {stage.moving.all(), stage.fixed.all()})
-    for (const Obstacle& o : obstacles)
-      if (o.is_dynamic()) dynamic.push_back(o.swept_bounds());
+  const auto may_move_bodies = [&](const ParticleSystem& system) {
+    if (!system.may_rest() || system.arrays.size() == 0) return false;
+    const Aabb reach = system.reach(stage.h, world_.def.gravity);
+    for (const std::span<const Obstacle> obstacles : {stage.moving.all(), stage.fixed.all()})
+      for (const Obstacle& o : obstacles)
+        if (o.is_dynamic() && o.swept_bounds().intersects(reach)) return true;
+    return false;
+  };
   world_.systems.for_each([&](ParticleSystemHandle handle, ParticleSystem& system) {
     if (waits(handle)) return;
     const bool hits_particles = system.hits_particles();
-    if (!hits_particles) {
-      if (!system.may_rest() || dynamic.empty() || system.arrays.size() == 0) return;
-      const Aabb reach = system.reach(stage.h, world_.def.gravity);
-      if (std::ranges::none_of(dynamic, [&](const Aabb& box) { return box.intersects(reach); })) return;
-    }
+    if (!hits_particles && !may_move_bodies(system)) return;
     system.fly_all(stage, world_.forces(system), coupled.holds(system));
     if (!hits_particles) system.find_on_bodies(stage);
     if (hits_particles || !system.on_bodies().empty()) colliding_.push_back(&system);
   });
-  if (colliding_.empty()) return {};
+  if (colliding_.empty()) {
+    collisions_.forget();
+    return {};
+  }
   const WorldDef& def = world_.def;
   const bool by_lcp = def.particle_contacts == ParticleContactMethod::lcp;
   collisions_.step(colliding_, stage, def.impact, def.collision_speed, by_lcp ? def.particle_cluster : 0);

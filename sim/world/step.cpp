@@ -132,7 +132,7 @@ void World::Impl::move_bodies(Real start, Real h, StepReport& report) {
 
 /// Moves the particles. They collide with bodies, cloths and each other, and push them.
 void World::Impl::step_particles(Real start, Real h, const CoupledSystem& coupled, StepReport& report) {
-  const Aabb particles = particle_motion.colliding_bounds(h);
+  const Aabb particles = active.awake().empty() ? Aabb{} : particle_motion.colliding_bounds(h);
   if (particle_motion.step(start, h, coupled, reactions.loads(contacts.pairs(), particles, h), report))
     remove_dead_springs();
   reactions.apply_particles(particle_motion.impulses(), start + h, h, report);

@@ -533,8 +533,6 @@ TEST_P(InternalEdges, DoNotStopBodiesOnAConveyor) {
   }
 }
 
-// Two inclined planes of many triangles meet at the bottom: a body that touches both slides along the line
-// where they meet.
 // The top edge of a ramp is that of the level box before it, or lies just beyond and below it. Its end face
 // is inside the level box, or behind its edge.
 TEST_P(InternalEdges, DoNotStopBodiesAtACrest) {
@@ -572,6 +570,8 @@ TEST_P(InternalEdges, DoNotStopBodiesAboveALowerTile) {
       }
 }
 
+// Two inclined planes of many triangles meet at the bottom: a body that touches both slides along the line
+// where they meet.
 TEST_P(InternalEdges, OfAValleyDoNotStopBodiesSlidingAlongIt) {
   const Real slope = std::tan(0.5), radius = 0.1;
   const Mover movers[] = {{"ball", Sphere{radius}, radius / std::cos(0.5)},
@@ -883,7 +883,8 @@ TEST_P(Sheets, LetBodiesSlideOffAStep) {
                                     std::to_string(slope) + ", step " + std::to_string(step);
           EXPECT_LT(deepest, 2e-3) << about;
           const Real fallen = std::sqrt(2 * kFallAcceleration * drop);
-          EXPECT_NEAR(world.body(body).velocity.x(), 3, 0.02 + 0.6 * fallen * (slope < 90)) << about;
+          EXPECT_GT(world.body(body).velocity.x(), 3 - 0.02) << about;
+          EXPECT_LT(world.body(body).velocity.x(), 3 + 0.02 + 0.6 * fallen * (slope < 90)) << about;
         }
 }
 

@@ -301,7 +301,7 @@ struct Table<Emitter> {
          "time for which the emitter has already been running at `start`. Until time 0, particles move and "
          "collide while dynamic bodies, cloths and particle groups stand still, kinematic bodies follow "
          "their keys, and forces have their values of time 0",
-         "s", kNotNegative},
+         "s", between(0, 3600)},
     }
                               .with_base<ParticleSource>()
                               .with(&T::placement));
