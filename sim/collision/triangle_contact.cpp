@@ -17,7 +17,8 @@ constexpr Real kGuard = 0.5;
 constexpr Real kValley = 1e-3;
 
 /// Greatest depth at which a face pushes a solid, as a multiple of the depth below a neighbouring face or
-/// along another normal that the surface allows.
+/// along another normal that the surface allows. A solid at a ridge is about equally deep below both faces;
+/// one that comes over the ridge is deeper below the face that it has not reached, by orders of magnitude.
 constexpr Real kMuchDeeper = 2;
 
 /// Returns the depth of the deepest point [m]; negative if all points are separate, or if there are none.
