@@ -16,6 +16,7 @@ class ClothGas {
   /// after the cloth has torn.
   void assign(std::span<const Triangle> triangles);
 
+  bool has_holes() const { return !holes_.empty(); }
   /// Volume inside, with each hole closed by a fan around the centre of its border [m^3].
   Real volume(std::span<const Vec3> points, std::span<const Triangle> triangles) const;
   /// Returns the sum of the areas of the holes [m^2]. The area of a hole is the length of its area vector.

@@ -9,11 +9,14 @@ namespace {
 
 constexpr Real kAirDensity = 1.2;  // density of leaking gas if none is given [kg/m^3]
 
-/// Returns the volume inside a cloth with its points at these positions [m^3], at least a tenth of the volume
+/// Returns the volume of the gas in a cloth that encloses this volume [m^3]: at least a tenth of the volume
 /// at rest. This minimum keeps cloth that is crushed flat from bursting. It also lets torn cloth, which
 /// encloses nothing, lose its gas.
+Real gas_volume(const Cloth& cloth, Real enclosed) {
+  return std::max(enclosed, 0.1 * cloth.rest_volume);
+}
 Real gas_volume(const Cloth& cloth, std::span<const Vec3> at) {
-  return std::max(cloth.gas.volume(at, cloth.triangles), 0.1 * cloth.rest_volume);
+  return gas_volume(cloth, cloth.gas.volume(at, cloth.triangles));
 }
 
 /// Returns the overpressure of the gas filled in so far at this volume, without leaks [Pa].
@@ -58,13 +61,23 @@ Real moved_with_skin(const Cloth& cloth) {
 }
 
 void GasForce::add_forces(std::span<const Vec4> x, Real factor, std::span<Vec4> force) {
-  at_.resize(x.size());
-  for (std::size_t i = 0; i < x.size(); ++i) at_[i] = x[i].head<3>();
-  const Real sixth = factor * acting_pressure(*cloth_, gas_volume(*cloth_, at_)) / 6;
+  // Each corner of a triangle gets a third of the pressure on it. By the divergence theorem, the volume is a
+  // sixth of the sum of the doubled area vectors times a corner.
+  doubled_.assign(x.size(), Vec4::Zero());
+  Real six_fold = 0;
   for (const Triangle& t : cloth_->triangles) {
-    const Vec4 third = padded(sixth * (at_[t[1]] - at_[t[0]]).cross(at_[t[2]] - at_[t[0]]));
-    for (uint32_t corner : t) force[corner] += third;
+    const Vec4 &a = x[t[0]], area = (x[t[1]] - a).cross3(x[t[2]] - a);
+    six_fold += (a - x[0]).dot(area);
+    for (uint32_t corner : t) doubled_[corner] += area;
   }
+  Real volume = gas_volume(*cloth_, six_fold / 6);
+  if (cloth_->gas.has_holes()) {
+    at_.resize(x.size());
+    for (std::size_t i = 0; i < x.size(); ++i) at_[i] = x[i].head<3>();
+    volume = gas_volume(*cloth_, at_);
+  }
+  const Real sixth = factor * acting_pressure(*cloth_, volume) / 6;
+  for (std::size_t i = 0; i < x.size(); ++i) force[i] += sixth * doubled_[i];
 }
 
 }  // namespace offstage::sim

@@ -37,7 +37,8 @@ class GasForce {
 
  private:
   const Cloth* cloth_;
-  std::vector<Vec3> at_;  // positions of the points in add_forces()
+  std::vector<Vec4> doubled_;  // by point: sum of the doubled area vectors of its triangles [m^2]
+  std::vector<Vec3> at_;       // positions of the points of a torn cloth
 };
 
 }  // namespace offstage::sim

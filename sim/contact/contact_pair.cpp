@@ -79,8 +79,10 @@ void ContactPair::find(const Pose& a, const Pose& b, Real margin, Real reuse_wit
     // Edges of a face have no effect on a ball that lies on the face.
     const bool on_face = (m.manifold.source == NormalSource::face_of_b && is_ball(*a_)) ||
                          (m.manifold.source == NormalSource::face_of_a && is_ball(*b_));
+    // Only a body that lies on immovable ones may pass over edges that it does not touch (internal_edges.h).
+    const bool may_pass = !a_->is_dynamic() || !b_->is_dynamic();
     has_narrow_ |= !on_face && !(m.manifold.continues_a && m.manifold.continues_b) &&
-                   is_narrow(near_deepest(m.manifold));
+                   is_narrow(may_pass ? near_deepest(m.manifold) : m.manifold);
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
       const Real separation = m.manifold.points[k].separation;
       separation_ = std::min(separation_, separation);

@@ -315,6 +315,7 @@ class BodyContacts {
   /// Whether a piece of X that lies on a face passes over a piece of Y, which it does not touch yet. The
   /// linearised contact with an edge in front of X, slightly below the face, would stop X before it is there.
   bool passes_over(const View& face, const View& v) const {
+    if (face.y().is_dynamic() || v.y().is_dynamic()) return false;  // they may yield
     if (face.x_piece != v.x_piece || (v.pair == face.pair && v.y_piece == face.y_piece)) return false;
     if (v.normal.dot(face.normal) > kOwnNormal || v.y().collision_shape().is_plane()) return false;
     return (v.speculative || v.separation() > 0) && separates(face, v);

@@ -19,8 +19,8 @@ constexpr Real kFlush = 1e-4, kFlushFraction = 1e-3;
 /// sub-step of length h [s], and pairs that share a body must be given together. A contact of a convex piece
 /// is at an internal edge if the piece already lies on a face and the other piece does not rise above that
 /// face. If another piece of the body lies on a face, and the plane of this face separates the two pieces
-/// throughout the sub-step, the contact gets the normal of that face. A contact of the same piece that does
-/// not touch yet is removed if this plane separates the two pieces. A contact at the foot of a slope gets the
+/// throughout the sub-step, the contact gets the normal of that face. A contact of the same piece with a body
+/// that is not dynamic, which does not touch yet, is removed if this plane separates the two pieces. A contact at the foot of a slope gets the
 /// normal of the slope. Returns the pairs that have changed, in the order given.
 std::vector<ContactPair*> remove_internal_edge_contacts(std::span<ContactPair* const> pairs, Real time,
                                                         Real h);

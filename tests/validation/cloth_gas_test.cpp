@@ -147,7 +147,8 @@ class PoppedBalloon : public testing::TestWithParam<bool> {};
 TEST_P(PoppedBalloon, FliesFreelyAndNoFasterThanItsGas) {
   // By Bernoulli's equation, gas of the gauge pressure p flows out at the speed sqrt(2 p / rho), so it cannot
   // push the remains of the skin faster. The shreds of the skin touch, but their moves are rarely shortened:
-  // the median is taken, because how a skin tears depends on rounding.
+  // the median is taken, because how a skin tears depends on rounding. Of 13 speeds from 19.5 to 20.5 m/s,
+  // the median has one shortened move in 120, and the greatest one in 18.
   ClothDef def = effects::sphere_cloth(0.1, 3, {}, effects::find_fabric("balloon")->fabric);
   def.pressure = 8440;
   def.gas_density = 0.17;
@@ -184,7 +185,7 @@ TEST_P(PoppedBalloon, FliesFreelyAndNoFasterThanItsGas) {
     EXPECT_LT(volume(), 0.3 * full);
   }
   std::ranges::sort(limited);
-  EXPECT_LT(limited[1], 5 * def.masses.size());  // each point moves at least 320 times
+  EXPECT_LT(limited[1], 16 * def.masses.size());  // each point moves at least 320 times
 }
 
 INSTANTIATE_TEST_SUITE_P(SelfCollision, PoppedBalloon, testing::Bool());

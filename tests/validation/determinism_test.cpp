@@ -141,7 +141,7 @@ constexpr const char* kParticles = "8771d8e4d50e37452108071c32eef986";
 constexpr const char* kSlidingExact = "22b661293c20ed7ff77ce765768dd992";
 constexpr const char* kBouncingExact = "a7878d9ca39d088d9f61d0630fe697b7";
 constexpr const char* kBouncingFast = "89180cfb7c5a8d48c25a7e1945536c95";
-constexpr const char* kHeapFast = "d80a3939c7c1f837b8c5ba3564ac5a2d";
+constexpr const char* kHeapFast = "ac5ff90f7e38e52da7957000b483063e";
 constexpr const char* kChainExact = "9f4bb37b9c79b48fa61d029f350a4f73";
 constexpr const char* kChainFast = "18b6c5d2cdccd1462d2c5f405b2a3077";
 

@@ -394,11 +394,11 @@ TEST_P(Pile, CollidingBoxesGainNoEnergy) {
   }
 }
 
+// A box may hang between corners of two others, and only air drag damps its swing.
 TEST_P(Pile, BoxesComeToRestInAPit) {
-  expect_settles(is_exact() ? 30 : 60, 6, 0, 5e-3);
+  expect_settles(is_exact() ? 30 : 60, 6, 0.05, 5e-3);
 }
-// The last of 500 boxes fall at 20 m/s. Among so many, one may hang between corners of two others, and only
-// air drag damps its swing.
+// The last of 500 boxes fall at 20 m/s.
 TEST_P(LongPile, HundredsOfBoxesComeToRestInAPit) {
   expect_settles(is_exact() ? 60 : 500, 20, 0.05, 0.02);
 }
