@@ -156,7 +156,7 @@ TEST_P(PoppedBalloon, FliesFreelyAndNoFasterThanItsGas) {
   def.tear = 1.75;
   def.self_collision = GetParam();
   std::vector<uint64_t> limited;
-  for (const Real speed : {19.99, 20.0, 20.1}) {
+  for (const Real speed : {19.6, 19.8, 20.0, 20.2, 20.4}) {
     World world({.gravity = Vec3::Zero()});
     const ClothHandle cloth = world.add_cloth(def);
     for (int i = 0; i < 30; ++i) world.step(1.0 / 60);
@@ -185,7 +185,7 @@ TEST_P(PoppedBalloon, FliesFreelyAndNoFasterThanItsGas) {
     EXPECT_LT(volume(), 0.3 * full);
   }
   std::ranges::sort(limited);
-  EXPECT_LT(limited[1], 16 * def.masses.size());  // each point moves at least 320 times
+  EXPECT_LT(limited[2], 16 * def.masses.size());  // each point moves at least 320 times
 }
 
 INSTANTIATE_TEST_SUITE_P(SelfCollision, PoppedBalloon, testing::Bool());
