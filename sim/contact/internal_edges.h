@@ -20,8 +20,9 @@ constexpr Real kFlush = 1e-4, kFlushFraction = 1e-3;
 /// is at an internal edge if the piece already lies on a face and the other piece does not rise above that
 /// face. If another piece of the body lies on a face, and the plane of this face separates the two pieces
 /// throughout the sub-step, the contact gets the normal of that face. A contact of the same piece with a body
-/// that is not dynamic, which does not touch yet, is removed if this plane separates the two pieces. A contact at the foot of a slope gets the
-/// normal of the slope. Returns the pairs that have changed, in the order given.
+/// that is not dynamic, which does not touch yet, is removed if this plane separates the two pieces. A
+/// contact at the foot of a slope gets the normal of the slope. Returns the pairs that have changed, in the
+/// order given.
 std::vector<ContactPair*> remove_internal_edge_contacts(std::span<ContactPair* const> pairs, Real time,
                                                         Real h);
 

@@ -251,7 +251,8 @@ TEST_P(Sleep, ABodyThatJumpsOrAppearsInItWakesIt) {
   }
 }
 
-// A spring begins to pull when the body at its other end appears. It moves both ends as it does without sleep.
+// A spring begins to pull when the body at its other end appears. It moves both ends as it does without
+// sleep.
 TEST_P(Sleep, ABodyThatAppearsAtASpringWakesTheOtherEnd) {
   for (const MotionType type : {MotionType::static_body, MotionType::kinematic, MotionType::dynamic}) {
     std::array<Vec3, 2> end[2];
