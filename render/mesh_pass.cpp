@@ -4,6 +4,7 @@
 #include <bit>
 #include <numeric>
 
+#include "render/smooth_surface.h"
 #include "render/texture.h"
 
 namespace offstage::render {
@@ -25,7 +26,6 @@ constexpr GLuint kVertexBinding = 0, kInstanceBinding = 1, kDetailBinding = 2;
 constexpr GLuint kSecondUv = 6, kColor = 7, kTangent = 8, kBefore = 9;  // attributes
 constexpr GLuint kMaterialBlock = 1;
 constexpr std::array<GLuint, kTextureMaps> kTextureUnits = {1, 2, 3, 14, 15, 16, 17};
-constexpr float kSmooth = 0.3f;  // a surface with a smaller roughness shows a mirror image of the scene
 // The first three rows of a transform.
 using Rows = std::array<Vector4f, 3>;
 
@@ -181,7 +181,7 @@ GpuMaterial make_gpu_material(const Material& material, std::span<const Image> t
   result.glass = material.transmission > 0 && !result.blended;
   result.plain = material.pattern == Pattern::none && !result.detailed && !result.blended && !result.glass &&
                  material.emission.isZero();
-  result.smooth = material.roughness < kSmooth || material.metallic > 0.5f;
+  result.smooth = is_smooth(material.roughness, material.metallic);
   return result;
 }
 

@@ -57,12 +57,10 @@ ParticleLight SmokeLight::of_particle(Scattering scattering, const Vector3f& pla
   const bool sprite = scattering == Scattering::sprite, drop = scattering == Scattering::drop;
   float fraction = air.sun(place, radius, number) * std::exp(-grid.depth(place));
   if (sprite) fraction = 0.2f + 0.8f * fraction;  // some light reaches the shadow of a cloud from all sides
+  const float to_all_sides = sprite ? 0.45f : drop ? kDropAround : 0.4f;
   ParticleLight light{.diffuse = around.at(place).light,
-                      .forward = (drop ? 0.9f : 0.8f) * fraction * sun_radiance};
-  light.diffuse.constant += air.lamps_around(place, radius, number) + (sprite ? 0.45f
-                                                                       : drop ? 0.12f
-                                                                              : 0.4f) *
-                                                                          fraction * sun_radiance;
+                      .forward = (drop ? kDropForward : 0.8f) * fraction * sun_radiance};
+  light.diffuse.constant += air.lamps_around(place, radius, number) + to_all_sides * fraction * sun_radiance;
   if (sprite) light.diffuse.slope += 0.35f * fraction * sun_radiance * to_sun.transpose();
   return light;
 }

@@ -12,6 +12,9 @@
 
 namespace offstage::render {
 
+/// Light of the sun that a drop scatters: to all sides, and in the direction of the rays.
+inline constexpr float kDropAround = 0.12f, kDropForward = 0.9f;
+
 /// The lighting that all puffs of a sub-frame share, in the picture and in mirror images.
 struct SmokeLight {
   const OpacityGrid& grid;

@@ -22,7 +22,8 @@ Vector3f drop_light(const PuffLight& light, const GpuPoint& point, const Vector3
   const float radius = point.position.w(), number = point.velocity.w();
   const Vector3f through =
       0.5f * (around.sky * light.sky_reflection(-to_eye, 0.25f) + around.light.at(Vector3f::UnitY()));
-  const float scattered = 0.12f + 0.9f * forward_lobe(Scattering::drop, -light.to_sun.dot(to_eye));
+  const float scattered =
+      kDropAround + kDropForward * forward_lobe(Scattering::drop, -light.to_sun.dot(to_eye));
   const float visibility = light.air.sun(place, radius, number) * std::exp(-light.grid.depth(place));
   return through + visibility * scattered * light.frame.sun_radiance.head<3>() +
          light.air.lamps_around(place, radius, number);

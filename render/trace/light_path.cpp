@@ -8,18 +8,18 @@
 
 #include "render/opacity_grid.h"
 #include "render/puff_light.h"
+#include "render/smooth_surface.h"
 #include "render/trace/air_field.h"
 #include "render/trace/air_light.h"
 
 namespace offstage::render {
 namespace {
 
-constexpr int kMostBounces = 16;          // largest number of diffuse surfaces on a path
-constexpr int kMostSteps = 32;            // largest number of surfaces on a path, including mirrors and glass
-constexpr int kAirRays = 8;               // rays from each point in the air
-constexpr float kFaintest = 1e-3f;        // radiance of highlights that need no shadow ray
-constexpr float kMirrorRoughness = 0.3f;  // roughness below which shaders show a mirror image on a dielectric
-constexpr float kSmoothMetal = 0.35f;     // roughness of metals below which a path is reflected
+constexpr int kMostBounces = 16;       // largest number of diffuse surfaces on a path
+constexpr int kMostSteps = 32;         // largest number of surfaces on a path, including mirrors and glass
+constexpr int kAirRays = 8;            // rays from each point in the air
+constexpr float kFaintest = 1e-3f;     // radiance of highlights that need no shadow ray
+constexpr float kSmoothMetal = 0.35f;  // roughness of metals below which a path is reflected
 
 float fresnel_of_glass(float cosine, float ratio) {
   const float sine2 = ratio * ratio * (1 - cosine * cosine);

@@ -431,10 +431,12 @@ void LightTracer::write_arriving(LightBuffer& light) const {
       light.lamps[pixel] << value(1, x), value(2, x), value(3, x), 0;
       light.highlights[pixel].head<3>() += Vector3f(value(4, x), value(5, x), value(6, x));
     }
-    const std::size_t colors = row.channels().size() - 3;
-    for (int x = 0; x < width && !light.sun.empty(); ++x)
-      light.sun[start + static_cast<std::size_t>(x)] << value(colors, x), value(colors + 1, x),
-          value(colors + 2, x), 0;
+    if (!light.sun.empty()) {
+      const std::size_t colors = row.channels().size() - 3;
+      for (int x = 0; x < width; ++x)
+        light.sun[start + static_cast<std::size_t>(x)] << value(colors, x), value(colors + 1, x),
+            value(colors + 2, x), 0;
+    }
     if (!glow) return;
     row = LightValues(width, 1, 3);
     glow->write_row(y, row.channels(), 0);

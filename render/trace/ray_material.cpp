@@ -4,16 +4,16 @@
 #include <cmath>
 
 #include "render/image.h"
+#include "render/smooth_surface.h"
 #include "render/tone_map.h"
 #include "render/trace/ray_scene.h"
 
 namespace offstage::render {
 namespace {
 
-constexpr float kMeanCells = 2;           // footprint, in cells of a pattern, from which on its mean is used
-constexpr float kMeanThreads = 3;         // footprint, in threads, from which on their mean is used
-constexpr float kMirrorRoughness = 0.3f;  // see kSmooth in mesh_pass.cpp
-constexpr int kMostTexels = 1024;         // width of the copy of a texture
+constexpr float kMeanCells = 2;    // footprint, in cells of a pattern, from which on its mean is used
+constexpr float kMeanThreads = 3;  // footprint, in threads, from which on their mean is used
+constexpr int kMostTexels = 1024;  // width of the copy of a texture
 
 const std::array<float, 256>& linear_values() {
   static const std::array<float, 256> table = [] {
@@ -240,8 +240,8 @@ void RayMaterial::add_relief(const Vector3f& slope, Hit& hit) const {
   hit.turn_normal_to(-hit.direction);
   // The pass of surfaces, see MeshPass::surface_program(), draws the relief of patterns only on smooth
   // materials.
-  const bool is_smooth = roughness < kMirrorRoughness || metallic > 0.5f;
-  if (normal_map() != nullptr || (is_smooth && !hit.is_cloth)) hit.lamp_normal = hit.normal;
+  if (normal_map() != nullptr || (is_smooth(roughness, metallic) && !hit.is_cloth))
+    hit.lamp_normal = hit.normal;
 }
 
 bool RayMaterial::is_tinted() const {

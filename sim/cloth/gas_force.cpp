@@ -39,8 +39,8 @@ Real gas_density(const Cloth& cloth) {
 
 ClothGasState gas_state(const Cloth& cloth) {
   if (cloth.def.pressure == 0) return {};
-  return {cloth.gas.volume(cloth.points, cloth.triangles),
-          acting_pressure(cloth, gas_volume(cloth, cloth.points))};
+  const Real enclosed = cloth.gas.volume(cloth.points, cloth.triangles);
+  return {enclosed, acting_pressure(cloth, gas_volume(cloth, enclosed))};
 }
 
 bool leaks(const Cloth& cloth) {

@@ -266,12 +266,12 @@ void ParticleSystem::find_on_bodies(const ParticleStage& stage) {
     for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) {
       const Vec3& end = arrays.position[i];
       if (!(duration_[i] > 0) || !end.allFinite() || !arrays.velocity[i].allFinite()) continue;
+      near.find(start_position_[i], end, (1 + kNear) * arrays.radius[i]);
+      if (std::ranges::none_of(near.all(), [](const Obstacle* o) { return o->is_dynamic(); })) continue;
       // Cloth may stop the particle before it reaches a body, so it must be met in the order of time.
       const Real from = 1 - duration_[i] / stage.h;
-      if (!stage.cloths.empty() && stage.cloths.first_hit(start_position_[i], end, arrays.radius[i], from, 1))
-        continue;
-      near.find(start_position_[i], end, (1 + kNear) * arrays.radius[i]);
-      is_on_body_[i] = std::ranges::any_of(near.all(), [](const Obstacle* o) { return o->is_dynamic(); });
+      is_on_body_[i] =
+          stage.cloths.empty() || !stage.cloths.first_hit(start_position_[i], end, arrays.radius[i], from, 1);
     }
   });
   for (uint32_t i = 0; i < count; ++i)

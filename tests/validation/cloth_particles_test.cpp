@@ -167,6 +167,29 @@ TEST(ClothParticles, PushTheBodyThatHoldsTheCloth) {
     }
 }
 
+/// Cloth stops particles before they reach the light body behind it, also if both are on the way of a single
+/// sub-step.
+TEST(ClothParticles, DoNotPushABodyBehindCloth) {
+  World world({.gravity = Vec3::Zero(), .max_step = 1.0 / 60});
+  constexpr uint32_t kCells = 8;
+  ClothDef def = wide_cotton(0.4, kCells, {0, 0, 0});
+  for (uint32_t k = 0; k < def.vertices.size(); ++k)
+    def.pins.push_back({.vertex = k, .position = def.vertices[k]});
+  world.add_cloth(def);
+  const BodyHandle plate =
+      world.add_body({.shape = Box{{0.4, 0.02, 0.4}}, .pose = {Vec3(0, -0.04, 0)}, .mass = 0.01});
+  const ParticleSystemHandle shot = world.add_particle_system({.name = "shot"});
+  for (uint32_t i = 0; i < 40; ++i)
+    world.add_particle(shot, {.position = {0.15 * scatter(2 * i), 0.05 + 0.01 * i, 0.15 * scatter(2 * i + 1)},
+                              .velocity = {0, -20, 0},
+                              .mass = 2e-3,
+                              .radius = 0.004,
+                              .restitution = 0.4});
+  for (int i = 0; i < 4; ++i) world.step(1.0 / 60);
+  EXPECT_EQ(world.body(plate).velocity.norm(), 0);
+  for (const Vec3& p : world.particles(shot).position) EXPECT_GT(p.y(), 0);
+}
+
 /// The body moves as its joint permits, with the mass of the cloth that is pinned to it.
 TEST(ClothParticles, PushAJointedBodyThatHoldsTheCloth) {
   for (const bool internal : {false, true}) {
