@@ -55,8 +55,12 @@ Pose ClothBody::on_path(Real fraction) const {
   return displaced(pose, obstacle_.centre, -sag * bow_, -sag * turn_bow_);
 }
 
+Pose ClothBody::predicted(Real fraction) const {
+  return displaced(on_path(fraction), obstacle_.centre, shift_, turn_);
+}
+
 void ClothBody::begin(Real from, Real to, Real dt) {
-  start_ = from > 0 ? end_ : displaced(on_path(from), obstacle_.centre, shift_, turn_);
+  start_ = from > 0 ? end_ : predicted(from);
   shift_ += dt * gained_;
   turn_ += dt * gained_spin_;
   moved_by_others_ += dt * gained_by_others_;
@@ -168,7 +172,7 @@ Pose ClothBody::own_end() const {
 
 /// Updates the pose at the end of the cloth's sub-step.
 void ClothBody::move_end() {
-  end_ = displaced(on_path(to_), obstacle_.centre, shift_, turn_);
+  end_ = predicted(to_);
   centre_ = end_.point_to_world(obstacle_.centre);
 }
 
@@ -185,7 +189,7 @@ void ClothBody::apply_contact_impulse(const Vec3& impulse, const Vec3& p, Real f
   if (!is_dynamic()) return;
   shift_ += fraction * dt_ * (gained_ - gained);
   turn_ += fraction * dt_ * (gained_spin_ - gained_spin);
-  end_ = displaced(on_path(to_), obstacle_.centre, shift_, turn_);
+  end_ = predicted(to_);
   displace_connected(fraction * dt_ * (momentum_of(reaction_) - momentum_of(before)));
 }
 
@@ -194,7 +198,7 @@ void ClothBody::apply_impulses(const Vec6& impulse, const Vec6& displacement) {
   add_impulse(impulse);
   shift_ += displacement.head<3>();
   turn_ += displacement.tail<3>();
-  end_ = displaced(on_path(to_), obstacle_.centre, shift_, turn_);
+  end_ = predicted(to_);
   if (!connected_.empty()) displace_connected(impulse_for(displacement));
 }
 

@@ -60,7 +60,9 @@ class ClothBody {
   Real duration() const { return dt_; }         ///< duration of the cloth's sub-step [s]
   const Pose& start() const { return start_; }  ///< pose at the start of the cloth's sub-step
   const Pose& end() const { return end_; }
-  /// The same without displacements by impulses on bodies to which joints connect this one.
+  /// Pose at a fraction of the world's sub-step, without further displacements by cloth.
+  Pose predicted(Real fraction) const;
+  /// As end(), without displacements by impulses on bodies to which joints connect this one.
   Pose own_end() const;
   const Solid& solid() const { return obstacle_.solid; }
   const Obstacle& obstacle() const { return obstacle_; }

@@ -65,7 +65,6 @@ void ClothSystem::tear_within(const ClothWeather& weather, Real fraction) {
   adapt_springs();
   find_held(weather.time, bodies_);
   contacts_.find(points_, collides_, bodies_, weather.h, fraction);
-  corner_contacts_.find(points_, contacts_, bodies_, weather.h);
 }
 
 /// Tears the threads of a cloth that are too long, and reports its first tear. Returns the number of torn

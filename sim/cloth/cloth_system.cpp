@@ -15,6 +15,9 @@ constexpr Real kMaxParts = 1000;
 /// Greatest distance by which a body may approach cloth in a sub-step, as a fraction of the mean edge of the
 /// triangles.
 constexpr Real kMostApproach = 0.1;
+/// Number of sub-steps of cloth for which features of bodies near triangles are searched at once. The longer
+/// this time is, the more triangles a fast body or cloth may reach in it, and each sub-step looks at all.
+constexpr Real kSubstepsPerSearch = 4;
 /// Greatest relative displacement of a spring's ends in a sub-step, as a fraction of the spring's length. It
 /// is also the greatest angle by which a spring turns; in air and without self-collision, kMostTurn is.
 constexpr Real kMostStrain = 1, kMostTurn = 0.25;
@@ -35,8 +38,13 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
   parts_ = parts_in(weather.h, speed);
   dt_ = weather.h / parts_;
   time_ = weather.time + weather.h;
-  Real since_look = 0;  // distance moved by the fastest body since the last search [m]
+  Real since_look = 0;  // distance moved by the fastest body since the last look for tears [m]
+  Real searched = 0;    // number of sub-steps for which the features near triangles are known
   for (Real k = 0; k < parts_; ++k) {
+    if (k >= searched) {
+      searched = std::min(k + kSubstepsPerSearch, parts_);
+      corner_contacts_.find(points_, contacts_, bodies_, k / parts_, searched / parts_, (searched - k) * dt_);
+    }
     for (Cloth* cloth : cloths_) cloth->age += dt_;
     apply_air(dt_, parts_ - k);
     substep(k / parts_, (k + 1) / parts_, dt_);
@@ -50,7 +58,10 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
     since_look += speed * dt_;
     if (since_look > corner_contacts_.mean_edge() && k + 1 < parts_) {
       since_look = 0;
-      if (any_tears()) tear_within(weather, (k + 1) / parts_);
+      if (any_tears()) {
+        tear_within(weather, (k + 1) / parts_);
+        searched = k + 1;
+      }
     }
   }
   count_penetration();
@@ -76,7 +87,6 @@ void ClothSystem::begin_step(const ClothWeather& weather, std::span<ClothBody> b
   for (const Carrier& carrier : carriers_) carrier.body->accelerate_steadily(weather.gravity);
   contacts_.set_up(-weather.gravity);
   contacts_.find(points_, collides_, bodies, weather.h);
-  corner_contacts_.find(points_, contacts_, bodies, weather.h);
 }
 
 /// Returns into how many sub-steps of cloth a sub-step of the world is divided, if bodies approach it at

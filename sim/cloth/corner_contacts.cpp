@@ -112,7 +112,7 @@ std::vector<CornerContacts::Corner> CornerContacts::corners(const Solid& solid) 
 }
 
 void CornerContacts::find(const ClothPoints& points, const ClothContacts& of_points,
-                          std::span<ClothBody> bodies, Real h) {
+                          std::span<ClothBody> bodies, Real from, Real to, Real h) {
   bodies_ = bodies;
   near_.clear();
   round_.clear();
@@ -135,11 +135,11 @@ void CornerContacts::find(const ClothPoints& points, const ClothContacts& of_poi
     const Obstacle& obstacle = bodies[b].obstacle();
     if (RoundContacts::concerns(obstacle.solid, longest_, thinnest_))
       seek(obstacle.swept_bounds(), b, [&](uint32_t t) { round_.add(t, b); });
+    const Pose first = bodies[b].predicted(from), last = bodies[b].predicted(to);
     for (const Corner& corner : corners(obstacle.solid)) {
-      const Vec3 from = obstacle.start.point_to_world(corner.place),
-                 to = obstacle.end.point_to_world(corner.place);
+      const Vec3 p = first.point_to_world(corner.place), q = last.point_to_world(corner.place);
       const Real depth = std::min(corner.depth, 2 * spacing_);
-      Aabb box(from.cwiseMin(to), from.cwiseMax(to));
+      Aabb box(p.cwiseMin(q), p.cwiseMax(q));
       box.min().array() -= depth;
       box.max().array() += depth;
       seek(box, b, [&](uint32_t t) { near_.push_back({{corner.place, corner.outward, depth}, b, t}); });
@@ -228,15 +228,19 @@ std::optional<TriangleContact> CornerContacts::touch(const Near& near, const std
                                                      Real thickness, Real reach, Real overhang) const {
   const ClothBody& body = bodies_[near.body];
   const Vec3 p = body.end().point_to_world(near.corner.place);
-  const Vec3 outward = body.end().vector_to_world(near.corner.outward);
   const Vec3 a = at[0], ab = at[1] - a, ac = at[2] - a;
   const Vec3 cross = ab.cross(ac);
   const Real size2 = cross.squaredNorm();
   if (!(size2 > 0)) return {};
+  const Real keeps = kTriangleDistance * thickness;
+  // Most features are far from the triangle's plane.
+  const Real far = std::max(near.corner.depth, keeps + reach), scaled_height = cross.dot(a - p);
+  if (scaled_height * scaled_height > size2 * far * far) return {};
+  const Vec3 outward = body.end().vector_to_world(near.corner.outward);
   const Vec3 n = cross / std::sqrt(size2) * (cross.dot(outward) < 0 ? -1 : 1);
   const Real cosine = n.dot(outward);
   if (cosine < kLeastCosine) return {};
-  const Real height = n.dot(a - p), gap = height - kTriangleDistance * thickness;
+  const Real height = n.dot(a - p), gap = height - keeps;
   if (gap >= reach || height < -near.corner.depth) return {};
   const Vec3 hit = p + height / cosine * outward - a;
   const Real s = hit.cross(ac).dot(cross) / size2, r = ab.cross(hit).dot(cross) / size2;

@@ -19,10 +19,12 @@ class CornerContacts {
  public:
   /// Sets the triangles of all cloths that collide with bodies.
   void assign(std::vector<Triangle> triangles, const ClothPoints& points);
-  /// Finds the pairs of features and triangles that can touch in a sub-step of the world of length h [s].
+  /// Finds the pairs of features and triangles that can touch in a part of a sub-step of the world. This part
+  /// covers the fractions `from` to `to` of the sub-step and lasts h [s]; the points are at its start.
   /// `of_points`: contacts of the same points. Triangles that pins hold inside a body have no contacts with
   /// it.
-  void find(const ClothPoints& points, const ClothContacts& of_points, std::span<ClothBody> bodies, Real h);
+  void find(const ClothPoints& points, const ClothContacts& of_points, std::span<ClothBody> bodies, Real from,
+            Real to, Real h);
   Real mean_edge() const { return 2 * spacing_; }  ///< mean length of the triangles' edges [m]
   /// Finds the supports of triangles (ClothPoints::triangle_supports) for a sub-step of the cloth of length
   /// dt [s]. `of_points`: contacts of the same points.

@@ -81,7 +81,7 @@ void pairs(benchmark::State& state, const ForceDef& def) {
   PairForces forces;
   forces.add(def, std::move(members));
   for (auto _ : state) {
-    forces.accelerate(0, x, dv);
+    forces.accelerate(x, dv);
     benchmark::DoNotOptimize(dv.data());
   }
   rates(state, "evaluations/s");

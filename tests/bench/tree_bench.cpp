@@ -60,7 +60,7 @@ Pose placed(Real gap) {
   return {touching.position + gap * touching.position.normalized(), touching.orientation};
 }
 
-enum Situation { kPressed, kTouching, kApart };
+enum Situation { kPressed, kTouching, kSeparated };
 
 Pose situation(int64_t which) {
   return placed(which == kPressed ? -0.03 : which == kTouching ? -1e-6 : 0.01);
@@ -174,7 +174,7 @@ void queries(benchmark::internal::Benchmark* b) {
   b->Unit(benchmark::kMicrosecond)->ArgsProduct({{kPressed, kTouching}, {0, 1}});
 }
 void apart(benchmark::internal::Benchmark* b) {
-  b->Unit(benchmark::kMicrosecond)->ArgsProduct({{kApart}, {0, 1}});
+  b->Unit(benchmark::kMicrosecond)->ArgsProduct({{kSeparated}, {0, 1}});
 }
 void builds(benchmark::internal::Benchmark* b) {
   b->Unit(benchmark::kMillisecond)->UseRealTime()->Arg(0)->Arg(1);
@@ -205,13 +205,13 @@ BENCHMARK_CAPTURE(fcl_collide, any_pair, std::size_t{1}, false)
     ->Unit(benchmark::kMicrosecond)
     ->Arg(kPressed)
     ->Arg(kTouching)
-    ->Arg(kApart);
+    ->Arg(kSeparated);
 BENCHMARK(distance<Aabb>)->Apply(apart);
 BENCHMARK(distance<Obb>)->Apply(apart);
 BENCHMARK(distance<BoundingSphere>)->Apply(apart);
 BENCHMARK(warm_distance<Aabb>)->Apply(apart);
 BENCHMARK(warm_distance<Obb>)->Apply(apart);
-BENCHMARK(fcl_mesh_distance)->Unit(benchmark::kMicrosecond)->Arg(kApart);
+BENCHMARK(fcl_mesh_distance)->Unit(benchmark::kMicrosecond)->Arg(kSeparated);
 
 }  // namespace
 }  // namespace offstage::sim
