@@ -256,8 +256,8 @@ void MeshPass::draw(const Batch& batch) {
 
 gl::LazyProgram& MeshPass::surface_program(const Batch& batch, Shading shading) {
   const GpuMaterial& material = *batch.material;
-  // The relief of a pattern is visible only in mirror images. A surface without mirror images is drawn
-  // without the relief, which is faster.
+  // A surface without mirror images is drawn without the relief of its pattern, which is faster. The light of
+  // lamps, which is traced for these surfaces, gets the relief in traced.glsl.
   const bool surface = shading == Shading::surface;
   const Pattern pattern = surface && !material.smooth ? Pattern::none : material.pattern;
   const bool plain = surface && is_plain(batch);
@@ -282,6 +282,7 @@ gl::LazyProgram& MeshPass::surface_program(const Batch& batch, Shading shading) 
   }
   if (pattern != Pattern::none) {
     defines.push_back("PATTERN " + std::to_string(static_cast<int>(pattern)));
+    if (!material.smooth) defines.push_back("ROUGH_PATTERN 1");
     fragment.insert(fragment.end(), {"noise.glsl", "pattern.glsl"});
   }
   fragment.push_back("mesh.frag");

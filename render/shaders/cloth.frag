@@ -53,7 +53,7 @@ void main() {
   mat2x3 along = cloth_frame(position, n, uv);
   vec3 relief = normalize(n - side * (along[0] * slope.x + along[1] * slope.y));
 
-  vec3 radiance = shade_fabric(s, through, relief, view, traced_light(relief, n)) +
+  vec3 radiance = shade_fabric(s, through, relief, view, traced_light(relief, n, n)) +
                   highlights_of_lamps(mix(vec3(0.04), s.albedo, s.metallic));
   radiance = apply_fog(radiance, position);
 #ifdef SHEER

@@ -39,5 +39,5 @@ float background_through() {
 Light light_on_glass(vec3 normal) {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec3 mirrored = texelFetch(traced_by_glass, pixel, 0).rgb;
-  return Light(vec3(texelFetch(traced_through, pixel, 0).w), ambient(normal), light_of_lamps(), 1.0, vec4(mirrored, 1.0));
+  return Light(vec3(texelFetch(traced_through, pixel, 0).w), ambient(normal), light_of_lamps(normal, normal), 1.0, vec4(mirrored, 1.0));
 }

@@ -158,7 +158,14 @@ void main() {
 #ifdef GLASS
   Light light = light_on_glass(n);
 #else
-  Light light = traced_light(n, smooth_normal);
+  vec3 lamp_normal = n;
+#ifdef ROUGH_PATTERN  // the pass of surfaces drew it without its relief
+  lamp_normal = smooth_normal;
+#endif
+#ifdef DETAILED
+  if (material.options.z > 0.5) lamp_normal = n;
+#endif
+  Light light = traced_light(n, smooth_normal, lamp_normal);
 #endif
   light.around *= occlusion;
   light.open *= occlusion;

@@ -25,6 +25,6 @@ void main() {
   float r2 = roughness * roughness;
   float lobe = metallic > 0.5 && roughness <= 0.12 ? roughness : sqrt(sqrt(max(r2 * r2 - added_roughness4(n), 0.0)));
   Surface s = Surface(own.rgb, roughness, metallic, vec3(0.0), lobe, normals_in_pixel(n));
-  vec3 radiance = shade(s, n, view, traced_light(n, n)) + highlights_of_lamps(mix(dielectric_f0, s.albedo, s.metallic));
+  vec3 radiance = shade(s, n, view, traced_light(n, n, n)) + highlights_of_lamps(mix(dielectric_f0, s.albedo, s.metallic));
   color = vec4(apply_fog(radiance, place.xyz), 1.0);
 }

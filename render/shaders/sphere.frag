@@ -29,7 +29,7 @@ void main() {
     float pixel = frame.eye.w * distance(frame.eye.xyz, hit) / ball.w;  // width of a pixel, in radii
     Normals normals = Normals(vec3(0.0), min(0.25 * pixel * pixel / max(-dot(n, ray), 0.1), 0.18));
     Surface s = Surface(color.rgb, surface.y, surface.x, vec3(0.0), surface.y, normals);
-    radiance = shade(s, n, -ray, traced_light(n, n)) + highlights_of_lamps(mix(vec3(0.04), s.albedo, s.metallic));
+    radiance = shade(s, n, -ray, traced_light(n, n, n)) + highlights_of_lamps(mix(vec3(0.04), s.albedo, s.metallic));
   }
   result = vec4(apply_fog(radiance, hit), 1.0);
 #endif

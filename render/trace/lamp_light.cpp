@@ -104,7 +104,7 @@ LightTracer::LampLight LightTracer::trace_lamps(const Points& points, Lanes vari
   Sampler<UintLanes> after_lamps = sampler;
   after_lamps.skip(static_cast<uint32_t>(sources_.lamps.size()));
   Highlights highlights(points, variance, view.eye, after_lamps.next());
-  LaneVectors diffuse{none, none, none};
+  LaneVectors diffuse{none, none, none}, towards = diffuse;
   Lanes without_shadows{};  // sum of all channels of `diffuse`
   for (const RayLamp& lamp : sources_.lamps) {
     const IntLanes shiny = points.visible & ~(lamp.def().in_mirrors ? points.mirrors : IntLanes{});
@@ -116,6 +116,7 @@ LightTracer::LampLight LightTracer::trace_lamps(const Points& points, Lanes vari
     const LaneVectors light = light_of_lamp(lamp, point, points, lanes, view);
     const Lanes nl = larger(dot(points.normal, point.towards), none);
     diffuse = diffuse + light * nl;
+    towards = towards + point.towards * (light.x + light.y + light.z);
     without_shadows += (lanes ? nl : none) * (point.arriving.x + point.arriving.y + point.arriving.z);
     highlights.begin(lamp);
     highlights.add(lamp, point, light * (shiny ? none + 1 : none));
@@ -125,7 +126,7 @@ LightTracer::LampLight LightTracer::trace_lamps(const Points& points, Lanes vari
     if (any(hit)) highlights.add_mirrored(met, light_of_lamp(lamp, met, points, hit, view));
   }
   const LaneVectors& lobes = highlights.lobes;
-  return {diffuse, lobes, highlights.grazing / larger(lobes.x + lobes.y + lobes.z, none + 1e-12f),
+  return {diffuse, lobes, towards, highlights.grazing / larger(lobes.x + lobes.y + lobes.z, none + 1e-12f),
           differs((diffuse.x + diffuse.y + diffuse.z) / without_shadows, without_shadows > 0.0f)};
 }
 

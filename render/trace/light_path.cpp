@@ -11,6 +11,7 @@
 #include "render/smooth_surface.h"
 #include "render/trace/air_field.h"
 #include "render/trace/air_light.h"
+#include "render/trace/packed_direction.h"
 
 namespace offstage::render {
 namespace {
@@ -279,9 +280,10 @@ Vector3f VisibleLight::direction_through(int x, int y) const {
   return (row_w.dot(direction) > 0 ? direction : Eigen::Vector3d(-direction)).cast<float>();
 }
 
-Vector3f VisibleLight::lamps(int pixel) const {
+Vector3f VisibleLight::lamps(int pixel, const Vector3f& traced, const Vector3f& normal) const {
   if (light_.lamps.empty()) return Vector3f::Zero();
-  return light_.lamps[static_cast<std::size_t>(pixel)].head<3>();
+  const Vector4f& light = light_.lamps[static_cast<std::size_t>(pixel)];
+  return lamp_relief(unpacked_direction(light.w()), traced, normal) * light.head<3>();
 }
 
 // Refracts or reflects a path at a glass surface, and adds the light that the surface scatters. Returns false
@@ -369,7 +371,7 @@ LightTracer::DirectLight LightTracer::direct_light(const Hit& hit, const Vector3
   if (towards_sun > 0 && sources_.sun.intensity > 0)
     result.sun = (sources_.sun.intensity * towards_sun * sun_visibility(from, on_sun))
                      .cwiseProduct(sources_.sun.color);
-  result.lamps = lamps_at(from, hit.lamp_normal, hit.face, sampler);
+  result.lamps = lamps_at(from, hit.normal, hit.face, sampler);
   result.glow = glow_at(from, hit.lamp_normal, hit.face, sampler);
   return result;
 }
@@ -533,9 +535,10 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
       const Vector4f& arriving = visible->arriving(pixel);
       const float cosine = hit.normal.dot(sources_.sky.sun_direction), through = hit.translucency;
       const Vector3f sun = (sources_.sun.intensity * visible->sun(pixel)).cwiseProduct(sources_.sun.color);
-      const Vector3f from_front = response.around.cwiseProduct(arriving.head<3>()) +
-                                  response.lamps.cwiseProduct(visible->lamps(pixel)) +
-                                  std::max(cosine, 0.0f) * response.sun.cwiseProduct(sun);
+      const Vector3f from_front =
+          response.around.cwiseProduct(arriving.head<3>()) +
+          response.lamps.cwiseProduct(visible->lamps(pixel, hit.lamp_normal, hit.normal)) +
+          std::max(cosine, 0.0f) * response.sun.cwiseProduct(sun);
       const Vector3f from_behind =
           surface.transmitted.cwiseProduct(arriving.head<3>() + std::max(-cosine, 0.0f) * sun);
       sum += path.fraction.cwiseProduct((1 - through) * from_front + through * from_behind);

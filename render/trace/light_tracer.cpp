@@ -217,6 +217,7 @@ void LightTracer::trace_pixels(const SurfaceBuffer& surfaces, int x, int y, int 
   if (!sources_.lamps.empty()) {
     const LampLight lamps = trace_lamps(points, highlight_variance(surfaces, points, x, y), view, sampler);
     const Lanes none{};
+    if (round == 0) lamps.store_directions(row_part(light.lamps, x, y, surfaces.width_px));
     add(direct[1], lamps.diffuse.x);
     add(direct[2], lamps.diffuse.y);
     add(direct[3], lamps.diffuse.z);
@@ -428,7 +429,7 @@ void LightTracer::write_arriving(LightBuffer& light) const {
                 row.channels()[0].at(0, 0), &light.arriving[start]);
     for (int x = 0; x < width && !light.lamps.empty(); ++x) {
       const std::size_t pixel = start + static_cast<std::size_t>(x);
-      light.lamps[pixel] << value(1, x), value(2, x), value(3, x), 0;
+      light.lamps[pixel].head<3>() << value(1, x), value(2, x), value(3, x);
       light.highlights[pixel].head<3>() += Vector3f(value(4, x), value(5, x), value(6, x));
     }
     if (!light.sun.empty()) {

@@ -36,9 +36,10 @@ struct LightBuffer {
       arriving;  ///< light from the sky and other surfaces; w: fraction of the sun that is visible
   std::vector<Vector4f>
       sun;  ///< visible fraction of the sun per channel; empty if it is equal for all channels
-  std::vector<Vector4f> mirrored;    ///< light from the mirrored direction; w: 1 where it was computed
-  bool has_mirrors = false;          ///< whether any surface mirrors; if not, `mirrored` is not updated
-  std::vector<Vector4f> lamps;       ///< diffuse light of lamps; empty if there are no lamps
+  std::vector<Vector4f> mirrored;  ///< light from the mirrored direction; w: 1 where it was computed
+  bool has_mirrors = false;        ///< whether any surface mirrors; if not, `mirrored` is not updated
+  /// Diffuse light of lamps; w: mean direction to them, see packed_direction(). Empty if there are no lamps.
+  std::vector<Vector4f> lamps;
   std::vector<Vector4f> highlights;  ///< specular light of lamps, without reflectance; w: Fresnel factor
   LightSums sums;
 
@@ -101,8 +102,9 @@ class VisibleLight {
     if (light_.sun.empty()) return Vector3f::Constant(arriving(pixel).w());
     return light_.sun[static_cast<std::size_t>(pixel)].head<3>();
   }
-  /// Returns the light of lamps at the surface in a pixel.
-  Vector3f lamps(int pixel) const;
+  /// Returns the light of lamps at the surface in a pixel, for a surface with the unit normal `normal`. The
+  /// light was traced for the normal `traced`, which lacks the relief of the material.
+  Vector3f lamps(int pixel, const Vector3f& traced, const Vector3f& normal) const;
 
  private:
   const LightBuffer& light_;

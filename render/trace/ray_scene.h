@@ -67,7 +67,8 @@ struct Hit {
   Vector3f position = Vector3f::Zero();
   Vector3f normal = Vector3f::Zero();         ///< smooth unit normal, on the side of the ray's origin
   Vector3f smooth_normal = Vector3f::Zero();  ///< the same without the relief of the material
-  Vector3f lamp_normal = Vector3f::Zero();    ///< the same as the shaders use it for lamps and glowing meshes
+  /// The smooth normal as the picture uses it to trace the light of lamps and glowing meshes.
+  Vector3f lamp_normal = Vector3f::Zero();
   Vector3f face = Vector3f::Zero();  ///< unit normal of the triangle, on the side of the ray's origin
   bool front = true;                 ///< whether the ray hits the front of the surface
   const RayMaterial* material = nullptr;

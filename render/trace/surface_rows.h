@@ -12,6 +12,7 @@
 
 #include "render/error.h"
 #include "render/trace/light_path.h"
+#include "render/trace/packed_direction.h"
 
 namespace offstage::render {
 
@@ -125,11 +126,16 @@ struct LightTracer::Points {
 /// Light of lamps at eight surfaces.
 struct LightTracer::LampLight {
   LaneVectors diffuse, lobes;
-  Lanes fresnel;       ///< factor of the lobes
-  bool partly_hidden;  ///< whether some of the surfaces are in shadow, and others less
+  LaneVectors towards;  ///< sum of the directions to the lamps, times their light
+  Lanes fresnel;        ///< factor of the lobes
+  bool partly_hidden;   ///< whether some of the surfaces are in shadow, and others less
 
   void store_diffuse(std::span<Vector4f> lamps) const {
     for (std::size_t i = 0; i < lamps.size(); ++i) lamps[i] = {diffuse.x[i], diffuse.y[i], diffuse.z[i], 0};
+  }
+  void store_directions(std::span<Vector4f> lamps) const {
+    for (std::size_t i = 0; i < lamps.size(); ++i)
+      lamps[i].w() = packed_direction({towards.x[i], towards.y[i], towards.z[i]});
   }
   void store_highlights(std::span<Vector4f> highlights) const {
     for (std::size_t i = 0; i < highlights.size(); ++i)
