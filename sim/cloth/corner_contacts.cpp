@@ -115,6 +115,7 @@ void CornerContacts::find(const ClothPoints& points, const ClothContacts& of_poi
                           std::span<ClothBody> bodies, Real from, Real to, Real h) {
   bodies_ = bodies;
   near_.clear();
+  corners_.clear();
   round_.clear();
   if (triangles_.empty()) return;
   bool fitted = false;
@@ -142,9 +143,21 @@ void CornerContacts::find(const ClothPoints& points, const ClothContacts& of_poi
       Aabb box(p.cwiseMin(q), p.cwiseMax(q));
       box.min().array() -= depth;
       box.max().array() += depth;
-      seek(box, b, [&](uint32_t t) { near_.push_back({{corner.place, corner.outward, depth}, b, t}); });
+      const auto index = static_cast<uint32_t>(corners_.size());
+      const std::size_t before = near_.size();
+      seek(box, b, [&](uint32_t t) { near_.push_back({index, t}); });
+      if (near_.size() > before) corners_.push_back({corner.place, corner.outward, depth, b});
     }
   }
+}
+
+const Vec3& CornerContacts::Places::of(uint32_t corner) {
+  if (known_ != corner) {
+    const Corner& c = of_.corners_[corner];
+    place_ = of_.bodies_[c.body].end().point_to_world(c.place);
+    known_ = corner;
+  }
+  return place_;
 }
 
 void CornerContacts::solve(ClothPoints& points, const ClothContacts& of_points, Real dt,
@@ -153,12 +166,16 @@ void CornerContacts::solve(ClothPoints& points, const ClothContacts& of_points, 
     return sim::is_pressed(t, body, points, of_points);
   };
   round_.solve(triangles_, points, bodies_, dt, cuts, is_pressed);
+  Places places(*this);
   for (const Near& near : near_) {
+    const Corner& corner = corners_[near.corner];
     const Triangle& t = triangles_[near.triangle];
-    if (is_pressed(t, bodies_[near.body])) continue;
-    if (const auto contact =
-            touch(near, {points.at(t[0]), points.at(t[1]), points.at(t[2])}, points.thickness[t[0]], 0, 0))
-      separate(*contact, t, points, bodies_[near.body], dt, cuts);
+    const auto contact =
+        touch(corner, places.of(near.corner), {points.at(t[0]), points.at(t[1]), points.at(t[2])},
+              points.thickness[t[0]], 0, 0);
+    if (!contact || is_pressed(t, bodies_[corner.body])) continue;
+    separate(*contact, t, points, bodies_[corner.body], dt, cuts);
+    places.forget();
   }
 }
 
@@ -168,16 +185,19 @@ void CornerContacts::collect(const ClothPoints& points, const ClothContacts& of_
     return is_pressed(t, body, points, of_points);
   };
   round_.collect(triangles_, points, bodies_, reach, pressed, found);
+  Places places(*this);
   for (const Near& near : near_) {
-    ClothBody& body = bodies_[near.body];
+    const Corner& corner = corners_[near.corner];
+    ClothBody& body = bodies_[corner.body];
+    if (!body.is_dynamic()) continue;
     const Triangle& t = triangles_[near.triangle];
-    if (!body.is_dynamic() || is_pressed(t, body, points, of_points)) continue;
     const Real thickness = points.thickness[t[0]];
-    const auto c =
-        touch(near, {points.at(t[0]), points.at(t[1]), points.at(t[2])}, thickness, reach * thickness, 0);
+    const auto c = touch(corner, places.of(near.corner), {points.at(t[0]), points.at(t[1]), points.at(t[2])},
+                         thickness, reach * thickness, 0);
+    if (!c || is_pressed(t, body, points, of_points)) continue;
     // Where points touch the body as well, their contacts stop it.
-    const auto is_close = [&](uint32_t i) { return of_points.is_close(points, near.body, i); };
-    if (c && std::ranges::none_of(t, is_close))
+    const auto is_close = [&](uint32_t i) { return of_points.is_close(points, corner.body, i); };
+    if (std::ranges::none_of(t, is_close))
       found.push_back({t, c->weights, &body, c->normal, c->on_body, c->gap});
   }
 }
@@ -186,12 +206,11 @@ void CornerContacts::find_supports(ClothPoints& points, const ClothContacts& of_
   for (auto& of_cloth : points.triangle_supports) of_cloth.clear();
   const auto add = [&](uint32_t triangle, ClothBody& body, auto&& find) {
     const Triangle& t = triangles_[triangle];
-    if (is_pressed(t, body, points, of_points)) return;
     std::array<Vec3, 3> at;
     for (std::size_t k = 0; k < 3; ++k)
       at[k] = (points.inverse_mass[t[k]] > 0 ? points.free_end(t[k], dt) : points.position[t[k]]).head<3>();
     const std::optional<TriangleContact> contact = find(t, at, kSupportReach * points.thickness[t[0]]);
-    if (!contact ||
+    if (!contact || is_pressed(t, body, points, of_points) ||
         std::ranges::any_of(t, [&](uint32_t i) { return !of_points.may_support(points, body, i); }))
       return;
     // The support may keep the triangle exactly at its distance, so that solve() finds no overlap.
@@ -218,30 +237,33 @@ void CornerContacts::find_supports(ClothPoints& points, const ClothContacts& of_
       return RoundContacts::touch(t, points, at, bodies_[b], reach, true);
     });
   });
-  for (const Near& near : near_)
-    add(near.triangle, bodies_[near.body], [&](const Triangle& t, const std::array<Vec3, 3>& at, Real reach) {
-      return touch(near, at, points.thickness[t[0]], reach, kSupportOverhang);
-    });
+  Places places(*this);
+  for (const Near& near : near_) {
+    const Corner& corner = corners_[near.corner];
+    add(near.triangle, bodies_[corner.body],
+        [&](const Triangle& t, const std::array<Vec3, 3>& at, Real reach) {
+          return touch(corner, places.of(near.corner), at, points.thickness[t[0]], reach, kSupportOverhang);
+        });
+  }
 }
 
-std::optional<TriangleContact> CornerContacts::touch(const Near& near, const std::array<Vec3, 3>& at,
-                                                     Real thickness, Real reach, Real overhang) const {
-  const ClothBody& body = bodies_[near.body];
-  const Vec3 p = body.end().point_to_world(near.corner.place);
+std::optional<TriangleContact> CornerContacts::touch(const Corner& corner, const Vec3& p,
+                                                     const std::array<Vec3, 3>& at, Real thickness,
+                                                     Real reach, Real overhang) const {
   const Vec3 a = at[0], ab = at[1] - a, ac = at[2] - a;
   const Vec3 cross = ab.cross(ac);
   const Real size2 = cross.squaredNorm();
   if (!(size2 > 0)) return {};
   const Real keeps = kTriangleDistance * thickness;
   // Most features are far from the triangle's plane.
-  const Real far = std::max(near.corner.depth, keeps + reach), scaled_height = cross.dot(a - p);
+  const Real far = std::max(corner.depth, keeps + reach), scaled_height = cross.dot(a - p);
   if (scaled_height * scaled_height > size2 * far * far) return {};
-  const Vec3 outward = body.end().vector_to_world(near.corner.outward);
+  const Vec3 outward = bodies_[corner.body].end().vector_to_world(corner.outward);
   const Vec3 n = cross / std::sqrt(size2) * (cross.dot(outward) < 0 ? -1 : 1);
   const Real cosine = n.dot(outward);
   if (cosine < kLeastCosine) return {};
   const Real height = n.dot(a - p), gap = height - keeps;
-  if (gap >= reach || height < -near.corner.depth) return {};
+  if (gap >= reach || height < -corner.depth) return {};
   const Vec3 hit = p + height / cosine * outward - a;
   const Real s = hit.cross(ac).dot(cross) / size2, r = ab.cross(hit).dot(cross) / size2;
   const std::array<Real, 3> weights = {1 - s - r, s, r};

@@ -42,17 +42,30 @@ class CornerContacts {
   struct Corner {
     Vec3 place, outward;
     Real depth;  // greatest depth at which cloth behind the feature still counts as coming from outside [m]
+    uint32_t body = 0;
   };
+  /// A pair of a feature and a triangle. All pairs of a feature are together.
   struct Near {
-    Corner corner;
-    uint32_t body, triangle;
+    uint32_t corner, triangle;
+  };
+  /// Places of features at the end of the cloth's sub-step. Each is computed once for all of its pairs.
+  class Places {
+   public:
+    explicit Places(const CornerContacts& of) : of_(of) {}
+    const Vec3& of(uint32_t corner);
+    void forget() { known_.reset(); }  ///< Bodies have moved.
+
+   private:
+    const CornerContacts& of_;
+    std::optional<uint32_t> known_;
+    Vec3 place_ = Vec3::Zero();
   };
 
   std::vector<Corner> corners(const Solid& solid) const;
-  /// Returns the contact if the distance of a triangle with its corners at `at` exceeds the contact distance
-  /// by less than `reach` [m], and no weight is below -`overhang`.
-  std::optional<TriangleContact> touch(const Near& near, const std::array<Vec3, 3>& at, Real thickness,
-                                       Real reach, Real overhang) const;
+  /// Returns the contact of a feature at the place `p` if the distance of a triangle with its corners at `at`
+  /// exceeds the contact distance by less than `reach` [m], and no weight is below -`overhang`.
+  std::optional<TriangleContact> touch(const Corner& corner, const Vec3& p, const std::array<Vec3, 3>& at,
+                                       Real thickness, Real reach, Real overhang) const;
 
   std::vector<Triangle> triangles_;
   ClothTree tree_;
@@ -60,6 +73,7 @@ class CornerContacts {
   Real longest_ = 0, thinnest_ = 0;  // longest edge and smallest thickness of the cloths [m]
   RoundContacts round_;
   std::span<ClothBody> bodies_;
+  std::vector<Corner> corners_;  // those with pairs
   std::vector<Near> near_;
 };
 
