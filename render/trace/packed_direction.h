@@ -20,9 +20,10 @@ inline constexpr float kMostRelief = 3;
 inline float packed_direction(const Eigen::Vector3f& v) {
   const float size = v.cwiseAbs().sum();
   if (!(size > 0)) return 0;
+  const auto sign = [](float x) { return x < 0 ? -1.0f : 1.0f; };
   Eigen::Vector2f p = v.head<2>() / size;
   if (v.z() < 0)
-    p = Eigen::Vector2f(std::copysign(1 - std::abs(p.y()), p.x()), std::copysign(1 - std::abs(p.x()), p.y()));
+    p = Eigen::Vector2f((1 - std::abs(p.y())) * sign(p.x()), (1 - std::abs(p.x())) * sign(p.y()));
   const auto step = [](float x) { return std::round((0.5f + 0.5f * x) * (kDirectionSteps - 1)); };
   return 1 + step(p.x()) + kDirectionSteps * step(p.y());
 }
