@@ -1,6 +1,7 @@
 // Goldens must detect a parameter that changed by one per cent, and a single changed pixel.
 
 #include <cstdlib>
+#include <set>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -30,6 +31,27 @@ TEST_F(Golden, UnchangedSceneIsIdentical) {
   EXPECT_EQ(run.code, 0) << run.out;
   EXPECT_NE(run.out.find("identical"), std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "report"));
+}
+
+TEST_F(Golden, RecordsTheFramesThatAreAskedFor) {
+  const auto bless = [&](const std::string& more) {
+    return offstage(std::string("bless ") + kScene + " --golden g --reason test " + more, folder_.path(),
+                    "env -u CI");
+  };
+  const auto pictures = [&] {
+    std::set<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_ / "g"))
+      if (entry.path().extension() == ".png") names.insert(entry.path().filename().string());
+    return names;
+  };
+  ASSERT_EQ(bless("--frames 3,2").code, 0);
+  const std::set<std::string> expected = {"tiny-0002.png", "tiny-0003.png"};
+  EXPECT_EQ(pictures(), expected);
+  ASSERT_EQ(bless("").code, 0);
+  EXPECT_EQ(pictures(), expected) << "the golden keeps its frames";
+  EXPECT_EQ(compare("").code, 0);
+  EXPECT_EQ(compare("--set output.duration=0.1").code, 6) << "a frame is missing";
+  EXPECT_EQ(bless("--frames 1000").code, 2);
 }
 
 TEST_F(Golden, StatesKeptByOneComparisonAreDrawnByAnother) {

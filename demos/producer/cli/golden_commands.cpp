@@ -16,6 +16,7 @@
 #include "producer/cli/failure.h"
 #include "producer/cli/options.h"
 #include "producer/run/fingerprint.h"
+#include "producer/run/frame_list.h"
 #include "producer/run/golden.h"
 #include "producer/run/golden_overview.h"
 #include "producer/run/junit.h"
@@ -29,7 +30,7 @@ namespace {
 
 struct BlessOptions {
   std::vector<std::string> scenes, allow;
-  std::string golden, reason;
+  std::string golden, reason, frames;
   int threads = 0;
   render::GlPlatform gl = render::GlPlatform::automatic;
 };
@@ -98,9 +99,10 @@ int compare_pictures(const CompareOptions& options) {
   return same ? kOk : kImagesDiffer;
 }
 
-Golden drawn_with_progress(const LoadedScene& scene, int threads, const GoldenStates& states = {}) {
+Golden drawn_with_progress(const LoadedScene& scene, const std::vector<int>& frames, int threads,
+                           const GoldenStates& states = {}) {
   ProgressPrinter printer(ProgressStyle::automatic);
-  Golden golden = draw_golden(scene, threads, states, std::ref(printer));
+  Golden golden = draw_golden(scene, frames, threads, states, std::ref(printer));
   printer.finish();
   return golden;
 }
@@ -140,7 +142,7 @@ void compare_scene(const CompareOptions& options, const std::string& file, Compa
     return several && !folder.empty() ? (fs::path(folder) / place.name).string() : folder;
   };
   const Golden expected = read_golden(options.golden, place.name);
-  Golden actual = drawn_with_progress(scene, threads_or_all(options.threads),
+  Golden actual = drawn_with_progress(scene, frames_of(expected), threads_or_all(options.threads),
                                       {states_in(options.states.keep), states_in(options.states.from)});
   actual.scene = place.name;
   const Verdict verdict = judge(expected, actual);
@@ -260,7 +262,10 @@ int bless_command(const BlessOptions& options) {
                                     .allow = options.allow},
                                    true, golden_overrides());
     const GoldenPlace place = find_golden(options.golden, scene, file, taken);
-    Golden golden = drawn_with_progress(scene, threads);
+    const std::vector<int> frames = options.frames.empty()
+                                        ? recorded_frames(options.golden, place.name)
+                                        : parse_frames(options.frames, scene.scene.frame_count());
+    Golden golden = drawn_with_progress(scene, frames, threads);
     golden.scene = place.name;
     golden.source = place.source;
     golden.reason = options.reason;
@@ -314,6 +319,10 @@ Command add_bless(CLI::App& app) {
   command->add_option("--golden", bless.golden, "Folder of the goldens")->capture_default_str();
   command->add_option("--reason", bless.reason, "Reason for the change, which the golden records")
       ->required();
+  command->add_option(
+      "--frames", bless.frames,
+      "Frames to record: 12,48 (negative numbers count from the end). Default: those of the golden;\n"
+      "for a new golden, the frames at a fifth and at three fifths of the film");
   add_allow(*command, bless.allow);
   add_threads(*command, bless.threads);
   add_gl(*command, bless.gl);

@@ -142,18 +142,17 @@ GoldenPlace find_golden(const fs::path& folder, const LoadedScene& scene, const 
                           " are in use");
 }
 
-Golden draw_golden(const LoadedScene& scene, int threads, const GoldenStates& states,
-                   const ProgressCallback& progress) {
+Golden draw_golden(const LoadedScene& scene, const std::vector<int>& frames, int threads,
+                   const GoldenStates& states, const ProgressCallback& progress) {
   Golden golden;
   golden.scene = scene.scene.name;
   const int count = scene.scene.frame_count();
-  RenderJob job{.frames = {std::max(1, count / 5), std::max(1, count * 3 / 5)},
-                .threads = threads,
-                .cache = {},
-                .keep = {}};
+  RenderJob job{.frames = frames, .threads = threads, .cache = {}, .keep = {}};
+  std::erase_if(job.frames, [&](int frame) { return frame > count; });
+  if (job.frames.empty()) job.frames = {std::max(1, count / 5), std::max(1, count * 3 / 5)};
   if (!states.keep.empty()) job.keep = fs::path(states.keep) / "states";
   if (!states.from.empty()) job.cache = fs::path(states.from) / "states";
-  if (job.frames[0] == job.frames[1]) job.frames.pop_back();
+  job.frames.erase(std::unique(job.frames.begin(), job.frames.end()), job.frames.end());
   std::vector<Problem> warnings;
   const ModelLibrary models(scene.scene, scene.folder, parts_cache(states), warnings);
   MemorySink sink(golden.frames);
@@ -162,6 +161,20 @@ Golden draw_golden(const LoadedScene& scene, int threads, const GoldenStates& st
   for (GoldenFrame& frame : golden.frames) frame.state_hash = stats.frame_states.at(frame.frame);
   golden.fingerprint = fingerprint(render::Context().info());
   return golden;
+}
+
+std::vector<int> recorded_frames(const fs::path& folder, const std::string& name) {
+  std::vector<int> frames;
+  const std::optional<JsonObject> json = read_json_file(folder / (name + ".json"));
+  if (json && json->has("frames"))
+    for (const JsonObject& f : json->objects("frames")) frames.push_back(f.count("frame", 0, kMostFrames));
+  return frames;
+}
+
+std::vector<int> frames_of(const Golden& golden) {
+  std::vector<int> frames;
+  for (const GoldenFrame& frame : golden.frames) frames.push_back(frame.frame);
+  return frames;
 }
 
 Golden read_golden(const fs::path& folder, const std::string& name) {
@@ -189,6 +202,12 @@ Golden read_golden(const fs::path& folder, const std::string& name) {
 
 void write_golden(const fs::path& folder, const Golden& golden) {
   fs::create_directories(folder);
+  const std::vector<int> drawn = frames_of(golden);
+  for (const int frame : recorded_frames(folder, golden.scene))
+    if (std::ranges::find(drawn, frame) == drawn.end()) {
+      std::error_code harmless;  // a picture that no golden names
+      fs::remove(picture_file(folder, golden.scene, frame), harmless);
+    }
   nlohmann::ordered_json json = {{"scene", golden.scene},
                                  {"source", golden.source},
                                  {"reason", golden.reason},

@@ -56,12 +56,18 @@ struct GoldenPlace {
 GoldenPlace find_golden(const std::filesystem::path& folder, const LoadedScene& scene,
                         const std::filesystem::path& scene_file, const std::set<std::string>& taken = {});
 
-/// Draws an early and a late frame of a scene, which must have been loaded with golden_overrides(). Throws
-/// Interrupted after a signal.
-Golden draw_golden(const LoadedScene& scene, int threads, const GoldenStates& states = {},
-                   const ProgressCallback& progress = {});
+/// Draws frames of a scene, which must have been loaded with golden_overrides(). `frames`: numbers of the
+/// frames in ascending order, from 1; those that the scene does not have are left out. Without any, the frames
+/// at a fifth and at three fifths of the scene are drawn. Throws Interrupted after a signal.
+Golden draw_golden(const LoadedScene& scene, const std::vector<int>& frames, int threads,
+                   const GoldenStates& states = {}, const ProgressCallback& progress = {});
+/// Numbers of the frames that the golden of this name records; none if there is no golden.
+std::vector<int> recorded_frames(const std::filesystem::path& folder, const std::string& name);
+/// Numbers of the frames of a golden.
+std::vector<int> frames_of(const Golden& golden);
 
-/// Read and write the file FOLDER/<name>.json and the pictures FOLDER/<name>-####.png. Both throw FileError.
+/// Read and write the file FOLDER/<name>.json and the pictures FOLDER/<name>-####.png. Writing removes the
+/// pictures of frames that the golden no longer has. Both throw FileError.
 Golden read_golden(const std::filesystem::path& folder, const std::string& name);
 void write_golden(const std::filesystem::path& folder, const Golden& golden);
 
