@@ -164,8 +164,9 @@ TEST_P(CurvedFloor, LetsRoundBodiesRollAsARoundTrough) {
 // proportion to the angle of the start, so in eight swings they take 7 % per radian of this angle.
 TEST_P(CurvedFloor, LetsACartRollAsARoundTrough) {
   const bool is_exact = std::get<0>(GetParam()) == SolverKind::exact;
-  const std::vector<Real> angles =
-      is_exact ? std::vector<Real>{0.4, 0.5, 0.5000001, 0.7} : std::vector<Real>{0.5, 0.7};
+  const std::vector<Real> angles = is_exact    ? std::vector<Real>{0.4, 0.5, 0.5000001, 0.7}
+                                   : is_fast() ? std::vector<Real>{0.5, 0.7}
+                                               : std::vector<Real>{0.7};
   for (const Real angle : angles)
     for (const Shape& wheel : {Shape(Sphere{kTroughBall}), Shape(Cylinder{kTroughBall, 0.05})}) {
       const Real left = energy_of_cart(angle, wheel);
