@@ -87,13 +87,53 @@ ConvexDecomposition all_parts(const std::vector<SolidMesh>& solids) {
 CollisionMesh::CollisionMesh(std::vector<SolidMesh> list) : CollisionMesh(joined(list), all_parts(list)) {
   if (list.size() > 1)
     for (const SolidMesh& one : list) solids.push_back(std::make_unique<CollisionMesh>(std::vector{one}));
+  set_round(std::move(list));
+}
+
+/// Stores the exact solids of round parts.
+void CollisionMesh::set_round(std::vector<SolidMesh> list) {
+  const auto is_round = [](const SolidMesh& s) { return s.round_hull || !s.round_parts.empty(); };
+  if (std::ranges::none_of(list, is_round)) return;
+  round_hulls_.reserve(list.size());  // so that hulls_ may refer to them
+  flat_hulls_.reserve(list.size());
+  for (SolidMesh& one : list) {
+    first_parts_.push_back(static_cast<uint32_t>(round_parts_.size()));
+    one.round_parts.resize(one.parts.size());
+    round_parts_.insert(round_parts_.end(), one.round_parts.begin(), one.round_parts.end());
+    surfaces_.push_back(one.round_hull ? &round_hulls_.emplace_back(*one.round_hull) : nullptr);
+    if (surfaces_.back())
+      hulls_.push_back(convex(*surfaces_.back()));
+    else
+      hulls_.push_back(convex(flat_hulls_.emplace_back(convex_hull(one.mesh.vertices))));
+  }
+}
+
+const RoundSolid* CollisionMesh::round_surface(uint32_t part) const {
+  if (surfaces_.empty()) return nullptr;
+  const auto after = std::ranges::upper_bound(first_parts_, part);
+  return surfaces_[static_cast<std::size_t>(after - first_parts_.begin()) - 1];
+}
+
+/// Returns the box of a part, which contains the exact solid, too.
+Aabb CollisionMesh::part_box(uint32_t part) const {
+  Aabb box = decomposition_->parts[part].box();
+  const RoundSolid* round = round_part(part);
+  if (!round) return box;
+  const Convex exact = convex(*round);
+  for (int axis = 0; axis < 3; ++axis)
+    for (const Real side : {-1.0, 1.0}) {
+      const Vec3 d = side * Vec3::Unit(axis);
+      uint32_t start = 0;
+      box.extend(exact.support(d, start) + exact.radius * d);
+    }
+  return box;
 }
 
 void CollisionMesh::decompose_once() const {
   std::call_once(once_, [this] {
     if (!decomposition_) decomposition_ = decompose(mesh, topology);
     std::vector<Aabb> boxes;
-    for (const ConvexPolyhedron& part : decomposition_->parts) boxes.push_back(part.box());
+    for (uint32_t k = 0; k < decomposition_->parts.size(); ++k) boxes.push_back(part_box(k));
     part_tree_ = AabbTree(boxes);
   });
 }
@@ -113,8 +153,15 @@ const PieceTree& CollisionMesh::piece_tree(bool of_triangles, const TreeChoice& 
   const std::pair key(of_triangles, choice);
   if (const auto known = trees_.find(key); known != trees_.end()) return known->second;
   if (of_triangles) return trees_.emplace(key, make_tree(mesh, choice)).first->second;
-  std::vector<std::span<const Vec3>> parts;
-  for (const ConvexPolyhedron& part : decomposition().parts) parts.push_back(part.vertices());
+  std::vector<std::vector<Vec3>> corners;  // of the parts and of the boxes of round parts
+  for (uint32_t k = 0; k < decomposition().parts.size(); ++k) {
+    const std::span<const Vec3> vertices = decomposition().parts[k].vertices();
+    corners.emplace_back(vertices.begin(), vertices.end());
+    if (!round_part(k)) continue;
+    const Aabb box = part_box(k);
+    for (int i = 0; i < 8; ++i) corners.back().push_back(box.corner(static_cast<Aabb::CornerType>(i)));
+  }
+  const std::vector<std::span<const Vec3>> parts(corners.begin(), corners.end());
   return trees_.emplace(key, make_tree(std::span<const std::span<const Vec3>>(parts), choice)).first->second;
 }
 

@@ -2,10 +2,13 @@
 /// A registered mesh, with data that are computed once and then shared by all bodies with this mesh (physics
 /// E2). All data are in the frame of the mesh.
 
+#include <algorithm>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -46,6 +49,20 @@ class CollisionMesh {
   /// The convex decomposition. It is computed at the first call, which may take seconds. Several threads may
   /// call this.
   const ConvexDecomposition& decomposition() const;
+  /// The exact solid that a part of the decomposition approximates; null if the part is exact.
+  const RoundSolid* round_part(uint32_t part) const {
+    return part < round_parts_.size() && round_parts_[part] ? &*round_parts_[part] : nullptr;
+  }
+  /// The convex hull of the exact solid of a compound to which a part belongs; null if it is not round.
+  const RoundSolid* round_surface(uint32_t part) const;
+  /// The exact convex hulls of the solids of a compound, if any of them is round; otherwise none.
+  std::span<const Convex> hulls() const { return hulls_; }
+  /// Index of the first part in hulls()[k].
+  uint32_t first_part(std::size_t k) const { return first_parts_[k]; }
+  /// Index of the first part of the solid to which a part belongs, in a compound with hulls().
+  uint32_t first_part_beside(uint32_t part) const {
+    return *std::prev(std::ranges::upper_bound(first_parts_, part));
+  }
   /// Bounding tree of the parts of the decomposition. Its items are the indices of the parts.
   const AabbTree& part_tree() const;
   /// Returns a bounding tree of the given kind, over the triangles or over the parts. It is computed at the
@@ -57,7 +74,15 @@ class CollisionMesh {
 
  private:
   void decompose_once() const;
+  void set_round(std::vector<SolidMesh> list);
+  Aabb part_box(uint32_t part) const;
 
+  std::vector<std::optional<RoundSolid>> round_parts_;  // empty: none
+  std::vector<RoundSolid> round_hulls_;                 // to which hulls_ refers
+  std::vector<ConvexPolyhedron> flat_hulls_;            // the same, of solids that are not round
+  std::vector<Convex> hulls_;
+  std::vector<uint32_t> first_parts_;
+  std::vector<const RoundSolid*> surfaces_;  // for each hull; null: not round
   mutable std::once_flag once_;
   mutable std::optional<ConvexDecomposition> decomposition_;
   mutable AabbTree part_tree_;

@@ -5,6 +5,7 @@
 /// (see CollisionShape's constructor). The half-space under a plane has no pieces.
 
 #include <optional>
+#include <span>
 #include <variant>
 
 #include "sim/collision/collision_mesh.h"
@@ -62,12 +63,22 @@ class CollisionShape {
   const CollisionMesh* surface() const { return triangles_ ? solid_.mesh : nullptr; }
   /// Whether Options::by_triangles was chosen for a mesh.
   bool is_by_triangles() const { return by_triangles_; }
-  /// Returns the convex hull of all pieces. A plane has none.
+  /// Returns the convex hull of all pieces. A plane has none. For a compound with round parts it is the hull
+  /// of the polyhedra that approximate them.
   const Convex& hull() const { return hull_; }
+  /// Returns exact convex hulls that together contain all pieces: one, or for a compound with round parts one
+  /// for each part.
+  std::span<const Convex> hulls() const { return hulls_.empty() ? std::span(&hull_, 1) : hulls_; }
+  /// Index of the first piece in hulls()[k].
+  uint32_t first_piece(std::size_t k) const;
+  /// Greatest distance of the shape's points from the origin of its frame [m], or a little more.
+  Real reach() const { return reach_; }
 
  private:
   Solid solid_;
   Convex hull_;
+  std::span<const Convex> hulls_;
+  Real reach_ = 0;
   PieceTree own_tree_;  // tree of a primitive: one volume
   // The tree of a mesh's parts or triangles.
   std::variant<std::monostate, const AabbTree*, const ObbTree*, const SphereTree*> tree_;

@@ -61,6 +61,18 @@ Vec3 ellipsoid_support(const Vec3& half, const Vec3& d) {
   return length > 0 ? Vec3(half.cwiseProduct(scaled) / length) : Vec3(half.x(), 0, 0);
 }
 
+Real cosine(Real sine) {
+  return std::sqrt(1 - sine * sine);
+}
+
+/// Returns the support point of a sector of a ring: a point of the arc, or of one of the two ends.
+Vec3 sector_support(const Vec3& half, Real sine, const Vec3& d) {
+  const Real y = std::copysign(half.y(), d.y()), c = cosine(sine), side = std::copysign(sine, d.z());
+  if (d.x() > 0 && std::abs(d.z()) * c <= d.x() * sine) return rim(d, half.x(), y);
+  const Real r = d.x() * c + d.z() * side >= 0 ? half.x() : half.z();
+  return {r * c, y, r * side};
+}
+
 struct ConvexOf {
   Convex operator()(const Sphere& s) const { return {.core = Convex::Core::point, .radius = s.radius}; }
   Convex operator()(const Box& b) const { return {.core = Convex::Core::box, .half = b.size / 2}; }
@@ -115,12 +127,17 @@ uint32_t support_vertex(const ConvexPolyhedron& p, const Vec3& d, uint32_t start
 }
 
 Vec3 Convex::support(const Vec3& d, uint32_t& number) const {
+  return place ? place->point_to_world(core_support(place->vector_to_body(d), number))
+               : core_support(d, number);
+}
+
+Vec3 Convex::core_support(const Vec3& d, uint32_t& number) const {
   switch (core) {
     case Core::point:
       break;
     case Core::segment:
       number = d.y() > 0;
-      return vertex(number);
+      return core_vertex(number);
     case Core::triangle:
       number = 0;
       for (uint32_t k = 1; k < 3; ++k)
@@ -135,6 +152,8 @@ Vec3 Convex::support(const Vec3& d, uint32_t& number) const {
       return cone_support(half, d);
     case Core::ellipsoid:
       return ellipsoid_support(half, d);
+    case Core::sector:
+      return sector_support(half, sine, d);
     case Core::polyhedron:
       number = support_vertex(*polyhedron, d, number);
       return polyhedron->vertex(number);
@@ -143,6 +162,10 @@ Vec3 Convex::support(const Vec3& d, uint32_t& number) const {
 }
 
 Vec3 Convex::vertex(uint32_t number) const {
+  return place ? place->point_to_world(core_vertex(number)) : core_vertex(number);
+}
+
+Vec3 Convex::core_vertex(uint32_t number) const {
   switch (core) {
     case Core::segment:
       return {0, number & 1 ? half.y() : -half.y(), 0};
@@ -159,20 +182,39 @@ Vec3 Convex::vertex(uint32_t number) const {
 
 Vec3 Convex::centre() const {
   if (core == Core::triangle) return (*corners[0] + *corners[1] + *corners[2]) / 3;
-  return core == Core::polyhedron ? polyhedron->centre() : Vec3::Zero();
+  const Vec3 own = core == Core::polyhedron ? polyhedron->centre()
+                   : core == Core::sector   ? Vec3((half.x() + half.z()) / 2 * cosine(sine), 0, 0)
+                                            : Vec3::Zero();
+  return place ? place->point_to_world(own) : own;
 }
 
 Real Convex::reach() const {
   if (core == Core::triangle)
     return radius + std::sqrt(std::max(
                         {corners[0]->squaredNorm(), corners[1]->squaredNorm(), corners[2]->squaredNorm()}));
-  if (core == Core::cone) return radius + std::hypot(std::max(half.x(), half.z()), half.y());
-  if (core == Core::ellipsoid) return radius + half.maxCoeff();
-  return radius + (core == Core::polyhedron ? polyhedron->reach() : half.norm());
+  const Real offset = radius + (place ? place->position.norm() : 0);
+  if (core == Core::cone) return offset + std::hypot(std::max(half.x(), half.z()), half.y());
+  if (core == Core::ellipsoid) return offset + half.maxCoeff();
+  if (core == Core::sector) return offset + std::hypot(half.x(), half.y());
+  return offset + (core == Core::polyhedron ? polyhedron->reach() : half.norm());
 }
 
 Convex convex(const Shape& primitive) {
   return std::visit(ConvexOf{}, primitive);
+}
+
+Convex convex(const RoundSolid& round) {
+  Convex solid;
+  if (const auto* shape = std::get_if<Shape>(&round.shape)) solid = convex(*shape);
+  if (const auto* s = std::get_if<RingSector>(&round.shape))
+    solid = {.core = Convex::Core::sector,
+             .half = Vec3(s->radius, s->half_height, s->inner),
+             .sine = s->sine,
+             .radius = s->around};
+  if (const auto* disc = std::get_if<RoundedDisc>(&round.shape))
+    solid = {.core = Convex::Core::cylinder, .half = Vec3(disc->radius, 0, 0), .radius = disc->around};
+  solid.place = &round.pose;
+  return solid;
 }
 
 Convex convex(const ConvexPolyhedron& polyhedron, Real radius) {

@@ -9,20 +9,24 @@
 #include "sim/core/types.h"
 #include "sim/geometry/convex_polyhedron.h"
 #include "sim/geometry/shape.h"
+#include "sim/geometry/solid_mesh.h"
 
 namespace offstage::sim {
 
 struct Convex {
-  enum class Core : uint8_t { point, segment, triangle, box, cylinder, cone, ellipsoid, polyhedron };
+  enum class Core : uint8_t { point, segment, triangle, box, cylinder, cone, ellipsoid, sector, polyhedron };
 
   Core core = Core::point;
   /// Size of the core [m]. Box: half sizes. Cylinder: (radius, half height, unused). Cone or frustum: (radius
   /// of the base, half height, radius of the top), where a cone's top has radius 0. Ellipsoid: half axes.
-  /// Segment: half length in y.
+  /// Segment: half length in y. Sector of a ring: (radius, half height, radius of the inner corners).
   Vec3 half = Vec3::Zero();
+  Real sine = 0;    ///< sector: sine of half of its angle
   Real radius = 0;  ///< radius around the core [m]
   const ConvexPolyhedron* polyhedron = nullptr;
   std::array<const Vec3*, 3> corners{};  ///< corners of a triangle
+  /// Pose of the core in the frame of the solid; null: the frames are the same.
+  const Pose* place = nullptr;
 
   /// Returns the farthest point of the core along `d`, which need not be unit. `vertex`: on return the number
   /// of the point. It consists of the sign bits of a box's corner, or is the index of a segment's end or of a
@@ -31,20 +35,27 @@ struct Convex {
   Vec3 support(const Vec3& d, uint32_t& vertex) const;
   /// Whether support points are vertices that can be identified by a number.
   bool has_vertices() const {
-    return core != Core::cylinder && core != Core::cone && core != Core::ellipsoid;
+    return core != Core::cylinder && core != Core::cone && core != Core::ellipsoid && core != Core::sector;
   }
   /// Returns the vertex of the core with a number from support(). An invalid number is mapped to some valid
   /// vertex.
   Vec3 vertex(uint32_t number) const;
   /// A point inside the core.
   Vec3 centre() const;
-  /// Greatest distance of the solid's points from the origin of the frame, including the radius [m].
+  /// Upper bound of the distance of the solid's points from the origin of the frame, including the radius
+  /// [m]. It is the greatest distance unless the core has a place.
   Real reach() const;
+
+ private:
+  Vec3 core_support(const Vec3& d, uint32_t& vertex) const;
+  Vec3 core_vertex(uint32_t number) const;
 };
 
 /// Returns the convex solid of a primitive. MeshShape and Plane are not accepted.
 Convex convex(const Shape& primitive);
 Convex convex(const ConvexPolyhedron& polyhedron, Real radius = 0);
+/// Returns a round solid. Its pose must outlive the convex solid.
+Convex convex(const RoundSolid& round);
 /// Returns a triangle as a convex solid. It refers to the three vertices, which must outlive it. A triangle
 /// without area acts as a segment or a point.
 Convex convex_triangle(const Vec3& a, const Vec3& b, const Vec3& c);

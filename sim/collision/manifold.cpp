@@ -153,7 +153,7 @@ Real tilt(const Body& reference, const SupportingFeature& f, const Body& inciden
 bool is_round(const Convex& c) {
   using Core = Convex::Core;
   return c.core == Core::point || c.core == Core::segment || c.core == Core::cylinder ||
-         c.core == Core::cone || c.core == Core::ellipsoid;
+         c.core == Core::cone || c.core == Core::ellipsoid || c.core == Core::sector;
 }
 
 /// Whether a point is directly above or below a face. It may be outside of the face's sides by at most `slop`

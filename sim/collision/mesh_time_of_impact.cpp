@@ -102,7 +102,7 @@ class Instant {
         pose_b_(b.path.at(fraction)),
         a_from_b_{pose_a_.point_to_body(pose_b_.position),
                   pose_a_.orientation.conjugate() * pose_b_.orientation},
-        placement_(a_from_b_, a.shape.hull().reach() + b.shape.hull().reach(), 0),
+        placement_(a_from_b_, a.shape.reach() + b.shape.reach(), 0),
         closing_(pose_a_.vector_to_body(b.path.velocity() - a.path.velocity())),
         turn_a_(turn_in_a(a)),
         turn_b_(turn_in_a(b)) {}
@@ -203,12 +203,22 @@ class Instant {
 /// angle^2 / 24.
 Real unevenness(const MovingShape& s) {
   if (s.shape.is_plane()) return 0;
-  return s.path.turn() * s.path.max_acceleration(s.shape.hull().reach()) / 24;
+  return s.path.turn() * s.path.max_acceleration(s.shape.reach()) / 24;
 }
 
 /// Returns the velocity of the material point that is at `place` [m per step].
 Vec3 velocity(const PosePath& path, Real fraction, const Vec3& place) {
   return path.velocity() + path.angular_velocity(fraction).cross(place - path.at(fraction).position);
+}
+
+/// Returns the first impact of any hull of a shape with a plane.
+std::optional<Impact> first_plane_impact(const MovingShape& a, const PosePath& plane, Real tolerance) {
+  std::optional<Impact> first;
+  for (const Convex& hull : a.shape.hulls()) {
+    const std::optional<Impact> impact = time_of_plane_impact({hull, a.path}, plane, tolerance);
+    if (impact && (!first || impact->fraction < first->fraction)) first = impact;
+  }
+  return first;
 }
 
 }  // namespace
@@ -226,7 +236,7 @@ std::optional<Impact> bisected_time_of_impact(const MovingShape& a, const Moving
   // Upper bound of the relative speed of any two points [m per step].
   const auto fastest = [](const MovingShape& s) {
     return s.shape.is_plane() ? s.path.velocity().norm()
-                              : s.path.velocity().norm() + s.path.turn() * s.shape.hull().reach();
+                              : s.path.velocity().norm() + s.path.turn() * s.shape.reach();
   };
   const Real speed = fastest(a) + fastest(b);
   Impact impact{.fraction = 0, .separation = {}};
@@ -248,8 +258,8 @@ std::optional<Impact> bisected_time_of_impact(const MovingShape& a, const Moving
 
 std::optional<Impact> time_of_impact(const MovingShape& a, const MovingShape& b, Real tolerance) {
   assert(!a.shape.is_plane());
+  if (b.shape.is_plane()) return first_plane_impact(a, b.path, tolerance);
   const MovingConvex hull_a{a.shape.hull(), a.path};
-  if (b.shape.is_plane()) return time_of_plane_impact(hull_a, b.path, tolerance);
   const bool convex = !a.shape.is_hollow() && !b.shape.is_hollow() && a.shape.piece_count() == 1 &&
                       b.shape.piece_count() == 1;
   if (convex) {

@@ -31,7 +31,7 @@ Pose inverse(const Pose& p) {
 }
 
 Placement placement(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b, Real margin) {
-  return {a_from_b, a.hull().reach() + b.hull().reach(), margin};
+  return {a_from_b, a.reach() + b.reach(), margin};
 }
 
 Separation measure(const Convex& a, const Convex& b, const Pose& a_from_b, DistanceMethod method,
@@ -137,6 +137,18 @@ int set_side(SurfaceTriangle& t, Real distance, const Vec3& outward, const Vec3&
   return before != 0 || distance <= 0 || (is_clear && std::abs(lean) > kFacing) ? t.side : 0;
 }
 
+/// Whether a contact in the direction `out` from a sector of a ring is at an end of its arc. There the surface
+/// continues with the next sector, which is nearer. The end of the arc approaches a floor while the ring rolls;
+/// the ring does not. All sectors of a ring that lies almost flat, within kOutward, may touch next.
+bool is_beside_arc(const Convex& c, const Vec3& out) {
+  constexpr Real kOutward = 0.3, kSeam = 1e-9;
+  if (c.core != Convex::Core::sector) return false;
+  const Vec3 d = c.place ? c.place->vector_to_body(out) : out;
+  const Real lean2 = d.x() * d.x() + d.z() * d.z();
+  return lean2 > kOutward * kOutward && d.x() > 0 &&
+         std::abs(d.z()) * std::sqrt(1 - c.sine * c.sine) > d.x() * c.sine + kSeam;
+}
+
 /// Two pieces of two shapes that are near each other, for which manifolds are computed.
 class PiecePair {
  public:
@@ -156,13 +168,18 @@ class PiecePair {
     const std::size_t before = found.size();
     const CollisionMesh *mesh_a = shape_a_.surface(), *mesh_b = shape_b_.surface();
     if (mesh_b && !mesh_a && a_.core == Convex::Core::point)
-      find_sphere({mesh_b, j_}, a_, Vec3::Zero(), a_from_b_, true, margin, found);
+      find_sphere({mesh_b, j_}, a_, a_.centre(), a_from_b_, true, margin, found);
     else if (mesh_a && !mesh_b && b_.core == Convex::Core::point)
-      find_sphere({mesh_a, i_}, b_, a_from_b_.position, Pose{}, false, margin, found);
+      find_sphere({mesh_a, i_}, b_, a_from_b_.point_to_world(b_.centre()), Pose{}, false, margin, found);
     else if (mesh_a || mesh_b)
       find_triangles(margin, method, turning, found);
     else
       find_solids(margin, method, turning, found);
+    const auto is_beside = [&](const Manifold& m) {
+      return is_beside_arc(a_, -m.normal) || is_beside_arc(b_, a_from_b_.vector_to_body(m.normal));
+    };
+    found.erase(std::remove_if(found.begin() + static_cast<std::ptrdiff_t>(before), found.end(), is_beside),
+                found.end());
     for (std::size_t k = before; k < found.size(); ++k) {
       found[k].piece_a = i_;
       found[k].piece_b = j_;
@@ -368,8 +385,10 @@ std::optional<Separation> separation(const CollisionShape& a, const CollisionSha
   assert(!a.is_plane());
   std::optional<Separation> nearest;
   if (b.is_plane()) {
-    nearest = plane_separation(a.hull(), a_from_b);
-    if (nearest->distance > limit) nearest.reset();
+    for (const Convex& hull : a.hulls()) {
+      const Separation s = plane_separation(hull, a_from_b);
+      if (s.distance <= limit && (!nearest || s.distance < nearest->distance)) nearest = s;
+    }
     return nearest;
   }
   const auto distance = [&](uint32_t i, uint32_t j) {
@@ -387,7 +406,9 @@ std::optional<Separation> separation(const CollisionShape& a, const CollisionSha
 
 bool touching(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b, TestCounts& counts) {
   assert(!a.is_plane());
-  if (b.is_plane()) return plane_separation(a.hull(), a_from_b).distance <= 0;
+  if (b.is_plane())
+    return std::ranges::any_of(
+        a.hulls(), [&](const Convex& hull) { return plane_separation(hull, a_from_b).distance <= 0; });
   const bool as_triangles = are_triangles(a, b);
   const auto are_separated = [&](uint32_t i, uint32_t j) {
     const Convex p = a.piece(i), q = b.piece(j);
@@ -410,8 +431,11 @@ void find_manifolds(const CollisionShape& a, const CollisionShape& b, const Pose
                     PairCache& cache, DistanceMethod method, std::vector<Manifold>& manifolds, bool turning) {
   assert(!a.is_plane());
   if (b.is_plane()) {
-    const Manifold m = plane_manifold(a.hull(), inverse(a_from_b), margin);
-    if (m.count > 0) manifolds.push_back(placed(m, a_from_b));
+    for (std::size_t k = 0; k < a.hulls().size(); ++k) {
+      Manifold m = plane_manifold(a.hulls()[k], inverse(a_from_b), margin);
+      m.piece_a = a.first_piece(k);
+      if (m.count > 0) manifolds.push_back(placed(m, a_from_b));
+    }
     return;
   }
   const std::size_t before = manifolds.size();

@@ -104,6 +104,7 @@ bool is_sphere_pair(const Convex& a, const Convex& b) {
   const auto is_known = [](const Convex& c) {
     return c.core == Core::point || c.core == Core::segment || (c.core == Core::box && c.radius == 0);
   };
+  if (a.place || b.place) return false;
   return (a.core == Core::point && is_known(b)) || (b.core == Core::point && is_known(a));
 }
 

@@ -304,12 +304,18 @@ Real disc_radius(const Convex& c, bool up) {
   return up && c.core == Convex::Core::cone ? c.half.z() : c.half.x();
 }
 
+/// Whether the solid is a disc without a round side, which has a radius around it.
+bool is_flat_disc(const Convex& c) {
+  return !(c.half.y() > 0);
+}
+
 /// Whether a larger part of the flat side than of the round side is within `slack`. Both parts are about
 /// equally wide across the plane through d and the axis, so their lengths in this plane decide.
 bool rests_on_disc(const Convex& c, const RoundSide& side, const Vec3& d, Real slack) {
   const bool up = d.y() > 0;
   if (up && c.core == Convex::Core::cone && !(c.half.z() > 0)) return false;
   const Real R = disc_radius(c, up), lean = d.dot(outward(d)), length = (side.to - side.from).norm();
+  if (is_flat_disc(c)) return 2 * R * lean <= slack;
   const Real disc_within = 2 * R * fraction_within(slack, 2 * R * lean) * std::abs(d.y()),
              line_within = length * fraction_within(slack, d.dot(side.from - side.to)) * d.dot(side.normal);
   return disc_within > line_within;
@@ -319,6 +325,7 @@ SupportingFeature revolved(const Convex& c, const Vec3& d, Real slack) {
   const RoundSide side = round_side(c, d);
   if (rests_on_disc(c, side, d, slack))
     return disc(disc_radius(c, d.y() > 0), std::copysign(c.half.y(), d.y()), d.y() > 0);
+  if (is_flat_disc(c)) return point_feature(side.from, side.from_tag);
   return segment_feature(side.from, side.from_tag, side.to, side.to_tag, d);
 }
 
@@ -333,8 +340,99 @@ SupportingFeature revolved_edge(const Convex& c, const Vec3& d, Real slack, cons
     return line;
   }
   const bool apex = c.core == Convex::Core::cone && !(c.half.z() > 0) && side.from.y() > 0;
-  if (rests_on_disc(c, side, d, slack)) line.count = 1;
+  if (is_flat_disc(c) || rests_on_disc(c, side, d, slack)) line.count = 1;
   if (!apex) line.edge = Vec3::UnitY().cross(outward(d));
+  return line;
+}
+
+// Sector of a ring
+
+/// Returns a flat side of a sector: one of the two ends along Y, the inside, or one of the two sides on which
+/// the neighbours in the ring lie.
+SupportingFeature sector_face(const Convex& c, const Vec3& d) {
+  const Real cosine = std::sqrt(1 - c.sine * c.sine), h = c.half.y(), across = cosine * d.x();
+  const auto corner = [&](bool outer, bool up, bool beyond) {
+    const Real r = outer ? c.half.x() : c.half.z();
+    return Vec3(r * cosine, up ? h : -h, beyond ? r * c.sine : -r * c.sine);
+  };
+  SupportingFeature f;
+  const auto add = [&](bool outer, bool up, bool beyond) {
+    f.add(corner(outer, up, beyond), (outer ? 1u : 0u) | (up ? 2u : 0u) | (beyond ? 4u : 0u));
+  };
+  const bool up = d.y() > 0, beyond = d.z() > 0;
+  const Real side = (beyond ? d.z() : -d.z()) * cosine - c.sine * d.x();
+  if (std::abs(d.y()) >= std::max(side, -across)) {
+    f.normal = up ? Vec3::UnitY() : Vec3(-Vec3::UnitY());
+    constexpr std::array<std::pair<bool, bool>, 4> kAround = {
+        {{false, false}, {false, true}, {true, true}, {true, false}}};  // counter-clockwise from above
+    for (std::size_t k = 0; k < 4; ++k) {
+      const auto& [outer, far] = kAround[up ? k : 3 - k];
+      add(outer, up, far);
+      // The arc between the outer corners has one further corner.
+      const auto& [next_outer, next_far] = kAround[up ? (k + 1) % 4 : (6 - k) % 4];
+      if (outer && next_outer) f.add(Vec3(c.half.x(), up ? h : -h, 0), up ? 8 : 9);
+    }
+  } else if (side > -across) {
+    f.normal = Vec3(-c.sine, 0, beyond ? cosine : -cosine);
+    const std::array<std::pair<bool, bool>, 4> around = {
+        {{false, false}, {true, false}, {true, true}, {false, true}}};  // outer, up
+    for (std::size_t k = 0; k < 4; ++k) {
+      const auto& [outer, high] = around[beyond ? k : 3 - k];
+      add(outer, high, beyond);
+    }
+  } else {
+    f.normal = -Vec3::UnitX();
+    const std::array<std::pair<bool, bool>, 4> around = {
+        {{false, false}, {false, true}, {true, true}, {true, false}}};  // up, beyond
+    for (const auto& [high, far] : around) add(false, high, far);
+  }
+  f.on_face = f.corners[0].point;
+  f.vertex = f.corners[0].tag;
+  return f;
+}
+
+/// Whether `d` points out of the round side of a sector.
+bool faces_arc(const Convex& c, const Vec3& d) {
+  return d.x() > 0 && std::abs(d.z()) * std::sqrt(1 - c.sine * c.sine) <= d.x() * c.sine;
+}
+
+/// Returns the radial direction of the arc's point that is farthest along d.
+Vec3 arc_direction(const Convex& c, const Vec3& d) {
+  if (faces_arc(c, d)) return outward(d);
+  return {std::sqrt(1 - c.sine * c.sine), 0, std::copysign(c.sine, d.z())};
+}
+
+/// Returns the line of the round side at the angle of d, or the point of the arc if the sector is flat.
+SupportingFeature sector_line(const Convex& c, const Vec3& d) {
+  const Vec3 out = c.half.x() * arc_direction(c, d);
+  const Vec3 up = std::copysign(c.half.y(), d.y()) * Vec3::UnitY();
+  const bool is_up = d.y() > 0;
+  SupportingFeature line = segment_feature(out + up, is_up ? kLineTag + 1 : kLineTag, out - up,
+                                           is_up ? kLineTag : kLineTag + 1, d);
+  if (!(c.half.y() > 0)) {
+    line = point_feature(out, kLineTag);
+    line.edge = Vec3::UnitY().cross(out).normalized();
+  }
+  return line;
+}
+
+SupportingFeature sector_feature(const Convex& c, const Vec3& d, Real slack) {
+  const Real lean = d.dot(arc_direction(c, d)), width = c.half.x() - c.half.z(), length = 2 * c.half.y();
+  if (!(length > 0)) return sector_line(c, d);  // of a torus, which touches with its arc
+  const Real side = std::abs(d.z()) * std::sqrt(1 - c.sine * c.sine) - c.sine * d.x();
+  const Real flat = width * fraction_within(slack, width * std::abs(lean)) * std::abs(d.y()),
+             round = length * fraction_within(slack, length * std::abs(d.y())) * lean;
+  return lean > std::max(side, -d.x()) && round >= flat ? sector_line(c, d) : sector_face(c, d);
+}
+
+SupportingFeature sector_edge(const Convex& c, const Vec3& d, const Vec3& on_surface) {
+  SupportingFeature line = sector_line(c, d);
+  if (c.half.y() > 0 && line.edge != Vec3::Zero())
+    line.rod = std::max(0.0, arc_direction(c, d).dot(on_surface));
+  if (c.half.y() > 0 && line.edge == Vec3::Zero()) {
+    line.count = 1;
+    line.edge = Vec3::UnitY().cross(outward(d));
+  }
   return line;
 }
 
@@ -348,36 +446,7 @@ SupportingFeature ellipsoid_point(const Convex& c, const Vec3& d) {
   return f;
 }
 
-}  // namespace
-
-void SupportingFeature::place(const Mat3& rotation, const Vec3& translation) {
-  for (uint32_t k = 0; k < count; ++k) corners[k].point = rotation * corners[k].point + translation;
-  normal = rotation * normal;
-  on_face = rotation * on_face + translation;
-  edge = rotation * edge;
-}
-
-SupportingFeature supporting_feature(const Convex& c, const Vec3& d, Real slack) {
-  switch (c.core) {
-    case Convex::Core::triangle:
-      return triangle_face(c, d, slack);
-    case Convex::Core::box:
-      return box_face(c, d, slack);
-    case Convex::Core::cylinder:
-    case Convex::Core::cone:
-      return revolved(c, d, slack);
-    case Convex::Core::polyhedron: {
-      const uint32_t v = support_vertex(*c.polyhedron, d, 0);
-      SupportingFeature f = polyhedron_face(*c.polyhedron, d, slack, v);
-      f.vertex = v;
-      return f;
-    }
-    default:
-      return supporting_edge(c, d, slack, Vec3::Zero());
-  }
-}
-
-SupportingFeature supporting_edge(const Convex& c, const Vec3& d, Real slack, const Vec3& on_surface) {
+SupportingFeature core_edge(const Convex& c, const Vec3& d, Real slack, const Vec3& on_surface) {
   switch (c.core) {
     case Convex::Core::point:
       return point_feature(Vec3::Zero(), 0);
@@ -395,10 +464,61 @@ SupportingFeature supporting_edge(const Convex& c, const Vec3& d, Real slack, co
       return revolved_edge(c, d, slack, on_surface);
     case Convex::Core::ellipsoid:
       return ellipsoid_point(c, d);
+    case Convex::Core::sector:
+      return sector_edge(c, d, on_surface);
     case Convex::Core::polyhedron:
       return polyhedron_edge(*c.polyhedron, d, slack, support_vertex(*c.polyhedron, d, 0));
   }
   return {};
+}
+
+SupportingFeature core_feature(const Convex& c, const Vec3& d, Real slack) {
+  switch (c.core) {
+    case Convex::Core::triangle:
+      return triangle_face(c, d, slack);
+    case Convex::Core::box:
+      return box_face(c, d, slack);
+    case Convex::Core::cylinder:
+    case Convex::Core::cone:
+      return revolved(c, d, slack);
+    case Convex::Core::sector:
+      return sector_feature(c, d, slack);
+    case Convex::Core::polyhedron: {
+      const uint32_t v = support_vertex(*c.polyhedron, d, 0);
+      SupportingFeature f = polyhedron_face(*c.polyhedron, d, slack, v);
+      f.vertex = v;
+      return f;
+    }
+    default:
+      return core_edge(c, d, slack, Vec3::Zero());
+  }
+}
+
+}  // namespace
+
+void SupportingFeature::place(const Mat3& rotation, const Vec3& translation) {
+  for (uint32_t k = 0; k < count; ++k) corners[k].point = rotation * corners[k].point + translation;
+  normal = rotation * normal;
+  on_face = rotation * on_face + translation;
+  edge = rotation * edge;
+}
+
+SupportingFeature supporting_feature(const Convex& c, const Vec3& d, Real slack) {
+  if (!c.place) return core_feature(c, d, slack);
+  Convex own = c;
+  own.place = nullptr;
+  SupportingFeature f = core_feature(own, c.place->vector_to_body(d), slack);
+  f.place(c.place->orientation.toRotationMatrix(), c.place->position);
+  return f;
+}
+
+SupportingFeature supporting_edge(const Convex& c, const Vec3& d, Real slack, const Vec3& on_surface) {
+  if (!c.place) return core_edge(c, d, slack, on_surface);
+  Convex own = c;
+  own.place = nullptr;
+  SupportingFeature f = core_edge(own, c.place->vector_to_body(d), slack, c.place->point_to_body(on_surface));
+  f.place(c.place->orientation.toRotationMatrix(), c.place->position);
+  return f;
 }
 
 }  // namespace offstage::sim

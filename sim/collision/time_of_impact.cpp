@@ -9,6 +9,9 @@
 namespace offstage::sim {
 namespace {
 
+/// An axis passes through the origin if its distance from it is at most this [m].
+constexpr Real kOnAxis = 1e-9;
+
 /// Greatest number of advances. It is enough for pairs whose bound of the closing speed is at most a hundred
 /// times the true speed.
 constexpr int kMaxAdvances = 2000;
@@ -30,10 +33,16 @@ Real core_reach(const Convex& shape) {
   return shape.reach() - shape.radius;
 }
 
-/// Whether a core is symmetric about the y axis of its frame.
-bool is_round(const Convex& shape) {
-  return shape.core == Convex::Core::segment || shape.core == Convex::Core::cylinder ||
-         shape.core == Convex::Core::cone;
+/// Returns the axis through the origin of the solid's frame about which its core is symmetric, if there is
+/// one.
+std::optional<Vec3> axis_of(const Convex& shape) {
+  if (shape.core != Convex::Core::segment && shape.core != Convex::Core::cylinder &&
+      shape.core != Convex::Core::cone)
+    return {};
+  if (!shape.place) return Vec3::UnitY();
+  const Vec3 axis = shape.place->vector_to_world(Vec3::UnitY());
+  if (!axis.cross(shape.place->position).isZero(kOnAxis)) return {};
+  return axis;
 }
 
 /// Advances until the solids are within the tolerance. `gap_at(fraction, separation)` measures the gap and
@@ -69,10 +78,11 @@ Real Gap::time_to(Real target) const {
 // of the moving e. Their sum is at most sqrt(2) s times the path's bound of |dw/dt| + w^2.
 CoreRotation core_rotation(const MovingConvex& solid, Real fraction) {
   const PosePath& path = solid.path;
-  if (!path.turns() || solid.shape.core == Convex::Core::point) return {};
+  if (!path.turns() || (solid.shape.core == Convex::Core::point && !solid.shape.place)) return {};
   const CoreRotation all{path.angular_velocity(fraction), path.max_acceleration(1)};
-  if (!is_round(solid.shape)) return all;
-  const Vec3 axis = path.at(fraction).vector_to_world(Vec3::UnitY());
+  const std::optional<Vec3> own = axis_of(solid.shape);
+  if (!own) return all;
+  const Vec3 axis = path.at(fraction).vector_to_world(*own);
   const Vec3 of_axis = all.velocity - all.velocity.dot(axis) * axis;
   const Real factor = std::numbers::sqrt2 * of_axis.norm() / all.velocity.norm();
   return factor < 1 ? CoreRotation{of_axis, factor * all.acceleration} : all;

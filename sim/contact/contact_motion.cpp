@@ -25,24 +25,6 @@ constexpr Real kParallel = 0.05;
 
 using Vec2 = Eigen::Vector2d;
 
-/// Whether a shape is round about an axis and has a rim: a cylinder, cone or frustum.
-bool is_revolved(const Shape& shape) {
-  return std::holds_alternative<Cylinder>(shape) || std::holds_alternative<Cone>(shape) ||
-         std::holds_alternative<Frustum>(shape);
-}
-/// Returns the radius around the core of a sphere or capsule, and 0 for other shapes [m].
-Real round_radius(const Shape& shape) {
-  if (const auto* sphere = std::get_if<Sphere>(&shape)) return sphere->radius;
-  if (const auto* capsule = std::get_if<Capsule>(&shape)) return capsule->radius;
-  return 0;
-}
-
-/// Returns the vector from the axis of a surface of revolution to the body's centre of mass, in the body's
-/// frame [m]. It is not 0 if the scene sets the centre of mass off the axis.
-Vec3 centre_off_axis(const Body& body) {
-  return body.is_awake() ? Vec3(body.rigid.centre.x(), 0, body.rigid.centre.z()) : Vec3(Vec3::Zero());
-}
-
 /// Returns the rotation of a point on a surface of revolution while the body turns. A point that faces the
 /// other body stays on the side of that body, so it turns with the meridian that faces the other body. Other
 /// points turn with the body, and so do all points if the other body is on the axis. `arm` is the vector from
@@ -104,6 +86,7 @@ Carried carried(const Body& body, Real time) {
 /// The two bodies and the manifold of a contact at the interval's start.
 struct Start {
   const Body &a, &b;
+  RoundSurface surface_a, surface_b;
   const Manifold& m;
   Vec3 arm_a, arm_b;
   Real gap;      // distance of the surfaces [m]; the contact is in the middle between them
@@ -122,13 +105,14 @@ bool has_lines(NormalSource s) {
 
 /// Returns the direction of a line of a body after the body has turned. The line of a rim is the tangent at
 /// the point that faces the other body. The line of a round side turns with the axis.
-Vec3 turned_edge(const Body& body, const Vec3& edge, const Carried& now, const Vec3& arm, const Vec3& out) {
+Vec3 turned_edge(const Body& body, const RoundSurface& surface, const Vec3& edge, const Carried& now,
+                 const Vec3& arm, const Vec3& out) {
   const Quat& from = start_orientation(body);
-  if (!is_revolved(body.def.shape)) return now.turn * edge;
-  const Vec3 axis = from * Vec3::UnitY();
+  if (!surface.is_revolved()) return now.turn * edge;
+  const Vec3 own_axis = surface.place.orientation * Vec3::UnitY(), axis = from * own_axis;
   if (std::abs(axis.dot(edge)) > 0.5) return now.turn * edge;
-  const Vec3 radial = turned_arm(body, arm, from, out, now.orientation, out);
-  const Vec3 tangent = (now.orientation * Vec3::UnitY()).cross(radial);
+  const Vec3 radial = turned_arm(surface, arm, from, out, now.orientation, out);
+  const Vec3 tangent = (now.orientation * own_axis).cross(radial);
   const Real length = tangent.norm();
   if (length < 1e-12) return now.turn * edge;
   return tangent.dot(now.turn * edge) < 0 ? Vec3(-tangent / length) : Vec3(tangent / length);
@@ -180,30 +164,32 @@ bool place_after(const Start& s, Real time, ContactPlace& place) {
   const Vec3& n = s.m.normal;
   Lines lines;
   if (has_lines(s.m.source))
-    lines = {turned_edge(s.a, s.m.edge_a, a, s.arm_a, -n), turned_edge(s.b, s.m.edge_b, b, s.arm_b, n)};
+    lines = {turned_edge(s.a, s.surface_a, s.m.edge_a, a, s.arm_a, -n),
+             turned_edge(s.b, s.surface_b, s.m.edge_b, b, s.arm_b, n)};
   place.normal = turned_normal(s, a, b, lines);
   if (!(place.normal.dot(n) > kPredictable)) return false;
   const Quat &from_a = start_orientation(s.a), &from_b = start_orientation(s.b);
   // The surface moves with its body, and the gap keeps the direction of the normal.
   const Vec3 to_a = s.gap / 2 * n, to_a_now = s.gap / 2 * place.normal;
   const auto arm_of_a = [&]() -> Vec3 {
-    return turned_arm(s.a, s.arm_a + to_a, from_a, -n, a.orientation, -place.normal) - to_a_now;
+    return turned_arm(s.surface_a, s.arm_a + to_a, from_a, -n, a.orientation, -place.normal) - to_a_now;
   };
   const auto arm_of_b = [&]() -> Vec3 {
-    return turned_arm(s.b, s.arm_b - to_a, from_b, n, b.orientation, place.normal) + to_a_now;
+    return turned_arm(s.surface_b, s.arm_b - to_a, from_b, n, b.orientation, place.normal) + to_a_now;
   };
   // Besides its motion along the first body's surface and the sliding, the contact moves with the material of
   // the other body.
   const Vec3 slide = time * s.sliding;
   const bool by_b = moves_with_b(s.m.source);
-  const auto turn_of = [&](const Body& body, const Carried& now, const Vec3& arm, const Vec3& out,
-                           const Vec3& out_now) {
-    if (!is_revolved(body.def.shape)) return now.turn;
-    const Quat& from = start_orientation(body);
-    return meridian_turn(arm + from * centre_off_axis(body), from, out, now.orientation, out_now);
+  const auto turn_of = [&](const Body& body, const RoundSurface& surface, const Carried& now, const Vec3& arm,
+                           const Vec3& out, const Vec3& out_now) {
+    if (!surface.is_revolved()) return now.turn;
+    const Quat from = start_orientation(body) * surface.place.orientation;
+    return meridian_turn(arm + from * surface.centre_off_axis(), from, out,
+                         now.orientation * surface.place.orientation, out_now);
   };
-  place.turn = by_b ? turn_of(s.b, b, s.arm_b - to_a, n, place.normal)
-                    : turn_of(s.a, a, s.arm_a + to_a, -n, -place.normal);
+  place.turn = by_b ? turn_of(s.b, s.surface_b, b, s.arm_b - to_a, n, place.normal)
+                    : turn_of(s.a, s.surface_a, a, s.arm_a + to_a, -n, -place.normal);
   if (by_b) {
     place.arm_b = arm_of_b();
     place.arm_a = a.turn * s.arm_a + (place.arm_b - b.turn * s.arm_b) - slide;
@@ -339,42 +325,52 @@ Vec3 start_centre(const Body& body) {
 
 bool runs_along(const Body& body, Real duration) {
   const Vec3 turn = duration * twist_of(body).angular_velocity;
-  return is_revolved(body.def.shape) && turn.squaredNorm() > kStraight * kStraight;
+  return has_revolved_part(body) && turn.squaredNorm() > kStraight * kStraight;
 }
 
 Real rim_speed(const Body& body, const Vec3& normal) {
-  if (!body.is_awake() || !is_revolved(body.def.shape)) return 0;
+  if (!body.is_awake() || body.solid.mesh || !has_revolved_part(body)) return 0;
   const Vec3 axis = body.start.orientation * Vec3::UnitY(), lean = normal.cross(axis);
   if (lean.norm() < kUpright || std::abs(normal.dot(axis)) < kUpright) return 0;
   return std::abs(body.start_twist.angular_velocity.cross(axis).dot(lean)) / lean.squaredNorm();
 }
 
-Vec3 turned_arm(const Body& body, const Vec3& arm, const Quat& from, const Vec3& out_from, const Quat& to,
-                const Vec3& out_to) {
-  const Shape& shape = body.def.shape;
+Vec3 turned_arm(const RoundSurface& surface, const Vec3& arm, const Quat& from, const Vec3& out_from,
+                const Quat& to, const Vec3& out_to) {
   const auto with_body = [&](const Vec3& r) { return Vec3(to * (from.conjugate() * r)); };
-  if (const Real radius = round_radius(shape); radius > 0)
+  if (const Real radius = surface.round_radius(); radius > 0)
     return with_body(arm - radius * out_from) + radius * out_to;
-  if (const auto* ellipsoid = std::get_if<Ellipsoid>(&shape)) {
+  const Quat own_from = from * surface.place.orientation, own_to = to * surface.place.orientation;
+  if (const Ellipsoid* ellipsoid = surface.ellipsoid()) {
     const auto facing = [&](const Quat& orientation, const Vec3& out) {
       const Vec3 scaled = ellipsoid->radii.cwiseProduct(orientation.conjugate() * out);
       return Vec3(ellipsoid->radii.cwiseProduct(scaled.normalized()));
     };
     // The contact can be next to the point that faces the other body, because of an error of the manifold.
     // This difference stays the same in the body's frame.
-    return with_body(arm) + to * (facing(to, out_to) - facing(from, out_from));
+    return with_body(arm) + own_to * (facing(own_to, out_to) - facing(own_from, out_from));
   }
-  if (!is_revolved(shape)) return with_body(arm);
+  if (!surface.is_revolved()) return with_body(arm);
   // The angle between the point and the meridian that faces the other body is an error of the manifold. It
   // stays the same.
-  const Vec3 off_axis = centre_off_axis(body), from_axis = arm + from * off_axis;
-  return meridian_turn(from_axis, from, out_from, to, out_to) * from_axis - to * off_axis;
+  const Vec3 off_axis = surface.centre_off_axis(),
+             from_axis = arm - surface.around * out_from + own_from * off_axis;
+  return meridian_turn(from_axis, own_from, out_from, own_to, out_to) * from_axis - own_to * off_axis +
+         surface.around * out_to;
 }
 
 ContactPlace contact_place(const Body& a, const Body& b, const Manifold& m, const Vec3& place, Real gap,
                            Real time, Real substep) {
   const Vec3 arm_a = place - start_centre(a), arm_b = place - start_centre(b);
-  const Start start{a, b, m, arm_a, arm_b, gap, first_twist(a).at(arm_a) - first_twist(b).at(arm_b)};
+  const Start start{a,
+                    b,
+                    round_surface(a, m.piece_a),
+                    round_surface(b, m.piece_b),
+                    m,
+                    arm_a,
+                    arm_b,
+                    gap,
+                    first_twist(a).at(arm_a) - first_twist(b).at(arm_b)};
   const ContactPlace at_start{m.normal, arm_a, arm_b, Quat::Identity()};
   if (std::max(twist_of(a).angular_velocity.norm(), twist_of(b).angular_velocity.norm()) * substep >
       kMostPredictedTurn)
@@ -390,7 +386,15 @@ ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, co
                              const Vec3& place, Real gap, Real duration, Real substep) {
   const Twist twist_a = twist_of(a), twist_b = twist_of(b);
   const Vec3 arm_a = place - start_centre(a), arm_b = place - start_centre(b);
-  const Start start{a, b, m, arm_a, arm_b, gap, first_twist(a).at(arm_a) - first_twist(b).at(arm_b)};
+  const Start start{a,
+                    b,
+                    round_surface(a, m.piece_a),
+                    round_surface(b, m.piece_b),
+                    m,
+                    arm_a,
+                    arm_b,
+                    gap,
+                    first_twist(a).at(arm_a) - first_twist(b).at(arm_b)};
   ContactMotion motion;
   motion.frame = frame;
   const bool is_face = m.source == NormalSource::face_of_a || m.source == NormalSource::face_of_b;
@@ -436,11 +440,11 @@ ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, co
       motion.middle.arm_a -= displacement;
     return motion;
   }
-  const Shape& carrier = (m.source == NormalSource::face_of_a ? b : a).def.shape;
+  const RoundSurface& carrier = m.source == NormalSource::face_of_a ? start.surface_b : start.surface_a;
   // A body that rides on a turning one would gain the error of the parabola in every interval.
   const bool is_carried = a.is_kinematic() || b.is_kinematic();
-  if (is_face && !is_carried && most2 < kEven * kEven && !is_revolved(carrier) &&
-      round_radius(carrier) == 0 && !std::holds_alternative<Ellipsoid>(carrier)) {
+  if (is_face && !is_carried && most2 < kEven * kEven && !carrier.is_revolved() &&
+      carrier.round_radius() == 0 && !carrier.ellipsoid()) {
     set_even_motion(start, frame, duration, motion);
     return motion;
   }

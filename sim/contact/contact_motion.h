@@ -11,6 +11,7 @@
 
 #include "sim/collision/contact_frame.h"
 #include "sim/collision/manifold.h"
+#include "sim/contact/round_surface.h"
 #include "sim/dynamics/body.h"
 
 namespace offstage::sim {
@@ -77,7 +78,7 @@ ContactFrame turned_frame(const ContactFrame& f, const Vec3& n);
 /// orientation `from` to orientation `to`. `arm` is the arm before. Corners turn with the body; points of
 /// spheres, caps, rims and round sides stay on the side that faces the other body. `out_from` and `out_to`
 /// are the directions to the other body (unit, world) before and after.
-Vec3 turned_arm(const Body& body, const Vec3& arm, const Quat& from, const Vec3& out_from, const Quat& to,
-                const Vec3& out_to);
+Vec3 turned_arm(const RoundSurface& surface, const Vec3& arm, const Quat& from, const Vec3& out_from,
+                const Quat& to, const Vec3& out_to);
 
 }  // namespace offstage::sim

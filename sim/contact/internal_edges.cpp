@@ -48,6 +48,11 @@ SurfaceDistance piece_distance(const CollisionShape& shape, uint32_t piece, cons
     if (distance > 0) return {distance, away / distance};
     return {0, shape.solid().mesh->topology.face_normal(piece)};
   }
+  if (convex.core != Convex::Core::polyhedron) {
+    GjkCache fresh;
+    const Separation s = gjk(Convex{}, convex, {-p, Quat::Identity()}, fresh);
+    return {s.distance, s.normal};
+  }
   const ConvexPolyhedron& polyhedron = *convex.polyhedron;
   SurfaceDistance inside{-std::numeric_limits<Real>::infinity(), Vec3::UnitY()};
   for (uint32_t f = 0; f < polyhedron.face_count(); ++f) {
@@ -63,6 +68,12 @@ SurfaceDistance piece_distance(const CollisionShape& shape, uint32_t piece, cons
 /// The start and the end of an interval.
 constexpr bool kBothEnds[] = {false, true};
 
+/// Returns the first piece of the ring to which a piece belongs; the piece itself if it is no part of a ring.
+uint32_t first_part_of_ring(Body& body, uint32_t piece) {
+  const CollisionMesh* mesh = body.solid.mesh;
+  return mesh && mesh->round_surface(piece) ? mesh->first_part_beside(piece) : piece;
+}
+
 /// A manifold seen from body X, one of its two bodies, if X also has other manifolds. Y is the other body.
 /// The view stores the data for comparing it with the other views of X.
 struct View {
@@ -70,7 +81,8 @@ struct View {
       : pair(&of),
         m(&manifold),
         index(i),
-        x_piece(x_is_first ? m->piece_a : m->piece_b),
+        x_part(x_is_first ? m->piece_a : m->piece_b),
+        x_piece(first_part_of_ring(x_is_first ? of.a() : of.b(), x_part)),
         y_piece(x_is_first ? m->piece_b : m->piece_a),
         x_is_a(x_is_first),
         speculative(is_speculative),
@@ -81,7 +93,8 @@ struct View {
 
   ContactPair* pair;
   const Manifold* m;
-  uint32_t index, x_piece, y_piece, deepest = 0;
+  /// x_part: piece of X. x_piece: the same for all sectors of a ring, over which a contact rolls.
+  uint32_t index, x_part, x_piece, y_piece, deepest = 0;
   bool x_is_a, speculative;
   Vec3 normal;  ///< towards X
 
@@ -233,7 +246,7 @@ class BodyContacts {
     const Vec3 at_end = pose(y, true).point_to_world(pose(y, false).point_to_body(known.on_y(known.deepest)));
     if (up.dot(v.on_y(k) - at_end) > flush_) return false;
     // At the end, other tiles divide the line on which X lies.
-    const bool between = known.pair != v.pair || is_round_about_axis(x_.def.shape);
+    const bool between = known.pair != v.pair || is_round_about_axis(x_.def.shape) || has_revolved_part(x_);
     ContactPoint point = v.m->points[k];
     if (known.x_is_a != v.x_is_a) std::swap(point.on_a, point.on_b);
     return known.pair->predicts(known.pair->manifolds()[known.index],
@@ -258,7 +271,7 @@ class BodyContacts {
     };
     const Real tips = speed(face, face.on_y(face.deepest)) - flush_ / (h_ - time_);
     return speed(v, v.on_y(v.deepest)) < tips &&
-           speed(v, farthest(v.x(), v.x_piece, pose(x_, false), -up)) < tips;
+           speed(v, farthest(v.x(), v.x_part, pose(x_, false), -up)) < tips;
   }
 
   /// Returns a new normal for a contact at or below the level of a face on which the same piece of X lies. It
@@ -332,7 +345,7 @@ class BodyContacts {
       const Pose below = pose(face.y(), at_end), x = pose(x_, at_end), y = pose(v.y(), at_end);
       const Vec3 n = below.vector_to_world(up);
       return n.dot(farthest(v.y(), v.y_piece, y, n) - below.point_to_world(on_face)) <= flush_ &&
-             n.dot(farthest(v.x(), v.x_piece, x, -n) - x.point_to_world(lying)) >= -flush_;
+             n.dot(farthest(v.x(), v.x_part, x, -n) - x.point_to_world(lying)) >= -flush_;
     });
   }
 
@@ -426,7 +439,7 @@ class BodyContacts {
     const Pose plane_from_x{plane.point_to_body(x.position), plane.orientation.conjugate() * x.orientation};
     const Real margin = std::max(0.0, v.separation()) + kSlopeMargin;
     const Manifold on_plane =
-        placed(plane_manifold(v.x().collision_shape().piece(v.x_piece), plane_from_x, margin), plane);
+        placed(plane_manifold(v.x().collision_shape().piece(v.x_part), plane_from_x, margin), plane);
     Manifold m = without_points(v, normal);
     // The piece stands on the face and not in the slope. If it is deeper in the slope than `least`, the slope
     // is not a slope but the corner of a flush object.

@@ -51,9 +51,11 @@ bool ContactPair::predicts(const PlacedManifold& m, const Vec3& normal, const Co
   const Vec3& n = m.frame.n;
   if (n.dot(normal) < kSameNormal) return false;
   const Ends ends_a(*a_), ends_b(*b_);
-  const auto moved = [](const Body& body, const Ends& ends, const Vec3& place, const Vec3& out_before,
-                        const Vec3& out_after) {
-    return Vec3(ends.end.position + turned_arm(body, place - ends.start.position, ends.start.orientation,
+  const RoundSurface surface_a = round_surface(*a_, m.manifold.piece_a),
+                     surface_b = round_surface(*b_, m.manifold.piece_b);
+  const auto moved = [](const RoundSurface& surface, const Ends& ends, const Vec3& place,
+                        const Vec3& out_before, const Vec3& out_after) {
+    return Vec3(ends.end.position + turned_arm(surface, place - ends.start.position, ends.start.orientation,
                                                out_before, ends.end.orientation, out_after));
   };
   struct Moved {
@@ -63,7 +65,7 @@ bool ContactPair::predicts(const PlacedManifold& m, const Vec3& normal, const Co
   std::array<Moved, 4> points;
   for (uint32_t k = 0; k < m.manifold.count; ++k) {
     const ContactPoint& p = m.manifold.points[k];
-    points[k] = {moved(*a_, ends_a, p.on_a, -n, -normal), moved(*b_, ends_b, p.on_b, n, normal),
+    points[k] = {moved(surface_a, ends_a, p.on_a, -n, -normal), moved(surface_b, ends_b, p.on_b, n, normal),
                  separation_at_end(m, p, duration)};
   }
   for (uint32_t k = 0; k < m.manifold.count; ++k)
@@ -99,7 +101,7 @@ PlacedManifold ContactPair::moved_back(const Manifold& at_end, Real duration) co
   if (m.source == NormalSource::face_of_a) m.normal = back(a, at_end.normal);
   if (m.source == NormalSource::face_of_b) m.normal = back(b, at_end.normal);
   set_frame(placed);
-  const auto arm = [&](const Body& body, const Ends& ends, const Vec3& place, Real side) {
+  const auto arm = [&](const RoundSurface& body, const Ends& ends, const Vec3& place, Real side) {
     return turned_arm(body, place - ends.end.position, ends.end.orientation, side * at_end.normal,
                       ends.start.orientation, side * m.normal);
   };
@@ -109,8 +111,8 @@ PlacedManifold ContactPair::moved_back(const Manifold& at_end, Real duration) co
   const bool by_b = moves_with_b(m.source);
   for (uint32_t k = 0; k < m.count; ++k) {
     ContactPoint& p = m.points[k];
-    const Vec3 on_a = a.start.position + arm(*a_, a, p.on_a, -1),
-               on_b = b.start.position + arm(*b_, b, p.on_b, 1);
+    const Vec3 on_a = a.start.position + arm(round_surface(*a_, m.piece_a), a, p.on_a, -1),
+               on_b = b.start.position + arm(round_surface(*b_, m.piece_b), b, p.on_b, 1);
     const Vec3& carrier = by_b ? on_b : on_a;
     const Vec3 middle = carrier + m.normal.dot((on_a + on_b) / 2 - carrier) * m.normal;
     p.separation -= free_displacement(placed, middle, m.normal.dot(on_a - on_b), duration);

@@ -71,15 +71,20 @@ SolidMesh convex_solid(TriangleMesh mesh) {
   return solid;
 }
 
-/// Divides a ring into convex sectors; each is the hull of the profile at two neighbouring sides.
-SolidMesh ring(const std::vector<Vec2>& profile) {
+/// Divides a ring into convex sectors; each is the hull of the profile at two neighbouring sides. `sector`:
+/// the exact solid of a sector, without its angle.
+SolidMesh ring(const std::vector<Vec2>& profile, RingSector sector) {
   SolidMesh solid{revolved_mesh(profile, true, kRoundSides), {}};
+  sector.sine = unit_circle(2 * kRoundSides)[1].y();
+  const std::vector<Vec2> half_turns = unit_circle(4 * kRoundSides);
   for (uint32_t k = 0; k < kRoundSides; ++k) {
     std::vector<Vec3> corners;
     for (std::size_t i = 0; i < profile.size(); ++i)
       for (const uint32_t side : {k, (k + 1) % kRoundSides})
         corners.push_back(solid.mesh.vertices[i * kRoundSides + side]);
     solid.parts.push_back(convex_hull(corners));
+    const Vec2& half_turn = half_turns[2 * k + 1];
+    solid.round_parts.push_back(RoundSolid{sector, {Vec3::Zero(), Quat(half_turn.x(), 0, half_turn.y(), 0)}});
   }
   return solid;
 }
@@ -196,12 +201,18 @@ SolidMesh solid_mesh(const Torus& torus) {
   std::vector<Vec2> profile;
   for (const Vec2& c : unit_circle(kTubeSides))
     profile.push_back(Vec2(torus.radius, 0) + torus.tube_radius * c);
-  return ring(profile);
+  SolidMesh solid =
+      ring(profile, {.radius = torus.radius, .inner = torus.radius, .around = torus.tube_radius});
+  solid.round_hull = RoundSolid{RoundedDisc{torus.radius, torus.tube_radius}, {}};
+  return solid;
 }
 
 SolidMesh solid_mesh(const Tube& tube) {
   const Real half = tube.height / 2, inner = tube.radius - tube.thickness;
-  return ring({{tube.radius, -half}, {tube.radius, half}, {inner, half}, {inner, -half}});
+  SolidMesh solid = ring({{tube.radius, -half}, {tube.radius, half}, {inner, half}, {inner, -half}},
+                         {.radius = tube.radius, .inner = inner, .half_height = half});
+  solid.round_hull = RoundSolid{Shape(Cylinder{tube.radius, tube.height}), {}};
+  return solid;
 }
 
 SolidMesh solid_mesh(const OpenBox& box) {
@@ -239,7 +250,11 @@ SolidMesh solid_mesh(const OpenBox& box) {
 }
 
 SolidMesh solid_mesh(const Shape& primitive) {
-  return convex_solid(std::visit([](const auto& shape) { return mesh_of(shape); }, primitive));
+  SolidMesh solid = convex_solid(std::visit([](const auto& shape) { return mesh_of(shape); }, primitive));
+  if (std::holds_alternative<Box>(primitive)) return solid;
+  solid.round_hull = RoundSolid{primitive, {}};
+  solid.round_parts.push_back(solid.round_hull);
+  return solid;
 }
 
 SolidMesh placed(SolidMesh solid, const Pose& pose) {
@@ -249,6 +264,13 @@ SolidMesh placed(SolidMesh solid, const Pose& pose) {
     for (Vec3& v : corners) v = pose.point_to_world(v);
     part = convex_hull(corners);
   }
+  const auto place = [&](std::optional<RoundSolid>& round) {
+    if (!round) return;
+    Pose& own = round->pose;
+    own = {pose.point_to_world(own.position), (pose.orientation * own.orientation).normalized()};
+  };
+  std::ranges::for_each(solid.round_parts, place);
+  place(solid.round_hull);
   return solid;
 }
 

@@ -3,6 +3,7 @@
 /// torus, tube and open box, whose mass properties have closed forms (physics N7). They are the parts of
 /// compounds.
 
+#include <optional>
 #include <variant>
 #include <vector>
 
@@ -36,10 +37,31 @@ MassProperties mass_properties(const Torus& torus);
 MassProperties mass_properties(const Tube& tube);
 MassProperties mass_properties(const OpenBox& box);
 
+/// A sector of a ring about Y, around +X: the convex hull of an arc at `radius` and its two ends at `inner`,
+/// extended by `half_height` along Y to both sides, and by `around` in all directions. Its outside is that of
+/// a tube (`around` = 0) or of a torus (`half_height` = 0, `inner` = `radius`); its inside is flat.
+struct RingSector {
+  Real radius = 0, inner = 0, half_height = 0, around = 0;  ///< [m]
+  Real sine = 0;                                            ///< sine of half of the sector's angle
+};
+/// The convex hull of a torus: all points within `around` of a disc about Y.
+struct RoundedDisc {
+  Real radius = 0, around = 0;  ///< [m]
+};
+/// A round solid that a polyhedron approximates.
+struct RoundSolid {
+  std::variant<Shape, RingSector, RoundedDisc> shape;
+  Pose pose;
+};
+
 /// A closed mesh, and convex solids without overlap that fill it.
 struct SolidMesh {
   TriangleMesh mesh;
   std::vector<ConvexPolyhedron> parts;
+  /// For each part the exact solid, if the part approximates one; empty: all parts are exact.
+  std::vector<std::optional<RoundSolid>> round_parts = {};
+  std::optional<RoundSolid> round_hull =
+      {};  ///< the convex hull of the exact solid; nothing: that of the mesh
 };
 
 /// Vertices are on the surface of the shape. A torus has 48 parts with 24 corners around the tube; a tube has

@@ -140,11 +140,12 @@ std::optional<Real> tumbling_impact_time(const ContactPair& pair, const WorldDef
 
 /// Returns where a contact feature of a body is [m] when the body has moved from one pose to another. `out`
 /// and `out_after` are the directions to the other body in both poses; see turned_arm().
-Vec3 moved_point(const Body& body, const Pose& from, const Pose& to, const Vec3& point, const Vec3& out,
-                 const Vec3& out_after) {
+Vec3 moved_point(const Body& body, uint32_t piece, const Pose& from, const Pose& to, const Vec3& point,
+                 const Vec3& out, const Vec3& out_after) {
   const Vec3 centre = body.is_awake() ? body.rigid.centre : Vec3(Vec3::Zero());
-  return to.point_to_world(centre) + turned_arm(body, point - from.point_to_world(centre), from.orientation,
-                                                out, to.orientation, out_after);
+  return to.point_to_world(centre) + turned_arm(round_surface(body, piece),
+                                                point - from.point_to_world(centre), from.orientation, out,
+                                                to.orientation, out_after);
 }
 
 /// Returns the time at which bodies that already touch at some points touch at their other known points.
@@ -165,8 +166,8 @@ std::optional<Real> point_impact_time(const ContactPair& pair, const WorldDef& d
       const auto gap = [&](Real time) {
         const Pose p = a.placed_at(time, h), q = b.placed_at(time, h);
         const Vec3 normal = with_b ? q.vector_to_world(n) : p.vector_to_world(n);
-        return normal.dot(moved_point(a, pose_a, p, point.on_a, -m.frame.n, -normal) -
-                          moved_point(b, pose_b, q, point.on_b, m.frame.n, normal));
+        return normal.dot(moved_point(a, m.manifold.piece_a, pose_a, p, point.on_a, -m.frame.n, -normal) -
+                          moved_point(b, m.manifold.piece_b, pose_b, q, point.on_b, m.frame.n, normal));
       };
       Real early = from, late = first.value_or(h);
       if (gap(late) > kTouching / 2) continue;

@@ -237,7 +237,8 @@ MeshHandle World::add_compound(const std::vector<SolidMesh>& solids) {
   for (const SolidMesh& solid : solids) {
     check_mesh("compound", solid.mesh);
     if (solid.parts.empty()) refuse("compound", "a part has no convex solids");
-    welded.push_back({weld(solid.mesh), solid.parts});
+    welded.push_back(solid);
+    welded.back().mesh = weld(solid.mesh);
     if (welded.back().mesh.triangles.empty()) refuse("compound", "a part has no face");
   }
   return impl_->meshes.insert(std::make_unique<CollisionMesh>(std::move(welded)));

@@ -140,7 +140,8 @@ template <>
 struct Table<sim::Torus> {
   static constexpr const char* kName = "torus";
   static constexpr const char* kHelp =
-      "A ring about y, centred on the body. It collides as 48 convex parts; its mass is exact.";
+      "A ring about y, centred on the body. It collides as 48 convex sectors, which are round on the outside; "
+      "its mass is exact.";
   static Fields<sim::Torus> fields() {
     return {
         {"radius", &sim::Torus::radius, "distance of the tube's centre line from the axis", "m", kPositive},
@@ -151,8 +152,8 @@ template <>
 struct Table<sim::Tube> {
   static constexpr const char* kName = "tube";
   static constexpr const char* kHelp =
-      "A hollow cylinder along y, open at both ends, centred on the body. It collides as 48 convex parts; "
-      "its mass is exact.";
+      "A hollow cylinder along y, open at both ends, centred on the body. It collides as 48 convex sectors, "
+      "which are round on the outside and flat on the inside; its mass is exact.";
   static Fields<sim::Tube> fields() {
     return {
         {"radius", &sim::Tube::radius, "radius of the outside", "m", kPositive},
@@ -201,8 +202,8 @@ struct Table<Compound> {
   static constexpr const char* kName = "compound";
   static constexpr const char* kHelp =
       "Several shapes that form one rigid body, such as a hammer. The mass and the inertia are sums over the "
-      "parts; where two parts overlap, the mass of both counts. Round parts collide with 32 to 48 flat "
-      "sides.";
+      "parts; where two parts overlap, the mass of both counts. Round parts are as round for other bodies as "
+      "the shapes alone; particles and cloth collide with 32 to 48 flat sides.";
   static Fields<Compound> fields() {
     return {{"parts", &Compound::parts, "shapes of which the body consists; at least one", kRequired}};
   }
