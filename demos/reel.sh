@@ -24,7 +24,7 @@ readme_reel() {
 {"version": 1, "include": ["../../demos/scenes/$scene.json"],
  "output": {"start": $from, "duration": $length, "fps": 12}}
 END
-    build/offstage render "$shot.json" --allow demos -o "$shot/####.png" --size 480x270 --resume "$@"
+    build/offstage render "$shot.json" --allow demos --allow assets -o "$shot/####.png" --size 480x270 --resume "$@"
     for frame in "$shot"/*.png; do cp "$frame" "out/readme/cut/${number}_$(basename "$frame")"; done
   done <<<"$readme_shots"
   ffmpeg -y -loglevel error -framerate 12 -pattern_type glob -i 'out/readme/cut/*.png' -c:v libwebp_anim -quality 60 \
@@ -74,7 +74,7 @@ while IFS='|' read -r scene from length title; do
  "overlays": [{"type": "text", "text": "$title", "place": "bottom_left", "size": 0.05}],
  "output": {"start": $from, "duration": $length, "fps": 30}}
 END
-  [ -f "$shot.mp4" ] || build/offstage render "$shot.json" --allow demos -o "$shot.mp4" "${options[@]}"
+  [ -f "$shot.mp4" ] || build/offstage render "$shot.json" --allow demos --allow assets -o "$shot.mp4" "${options[@]}"
   echo "file '$(basename "$shot.mp4")'" >>"$list"
 done <<<"$shots"
 ffmpeg -y -loglevel error -f concat -i "$list" -c copy out/reel.mp4

@@ -28,6 +28,6 @@ fi
 for scene in demos/scenes/*.json; do
   this=$(basename -s .json "$scene")
   if [ "$name" = all ] || [ "$name" = "$this" ]; then
-    build/offstage render "$scene" -o "out/$this.mp4" --force "$@"
+    build/offstage render "$scene" --allow assets -o "out/$this.mp4" --force "$@"
   fi
 done
