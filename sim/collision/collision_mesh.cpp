@@ -109,9 +109,12 @@ void CollisionMesh::set_round(std::vector<SolidMesh> list) {
 }
 
 const RoundSolid* CollisionMesh::round_surface(uint32_t part) const {
-  if (surfaces_.empty()) return nullptr;
-  const auto after = std::ranges::upper_bound(first_parts_, part);
-  return surfaces_[static_cast<std::size_t>(after - first_parts_.begin()) - 1];
+  return surfaces_.empty() ? nullptr : surfaces_[solid_of(part)];
+}
+
+/// Returns the index in hulls() of the solid to which a part belongs.
+std::size_t CollisionMesh::solid_of(uint32_t part) const {
+  return static_cast<std::size_t>(std::ranges::upper_bound(first_parts_, part) - first_parts_.begin()) - 1;
 }
 
 /// Returns the box of a part, which contains the exact solid, too.

@@ -2,8 +2,6 @@
 /// A registered mesh, with data that are computed once and then shared by all bodies with this mesh (physics
 /// E2). All data are in the frame of the mesh.
 
-#include <algorithm>
-#include <iterator>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -60,9 +58,7 @@ class CollisionMesh {
   /// Index of the first part in hulls()[k].
   uint32_t first_part(std::size_t k) const { return first_parts_[k]; }
   /// Index of the first part of the solid to which a part belongs, in a compound with hulls().
-  uint32_t first_part_beside(uint32_t part) const {
-    return *std::prev(std::ranges::upper_bound(first_parts_, part));
-  }
+  uint32_t first_part_of_solid_of(uint32_t part) const { return first_parts_[solid_of(part)]; }
   /// Bounding tree of the parts of the decomposition. Its items are the indices of the parts.
   const AabbTree& part_tree() const;
   /// Returns a bounding tree of the given kind, over the triangles or over the parts. It is computed at the
@@ -75,6 +71,7 @@ class CollisionMesh {
  private:
   void decompose_once() const;
   void set_round(std::vector<SolidMesh> list);
+  std::size_t solid_of(uint32_t part) const;
   Aabb part_box(uint32_t part) const;
 
   std::vector<std::optional<RoundSolid>> round_parts_;  // empty: none

@@ -137,9 +137,10 @@ int set_side(SurfaceTriangle& t, Real distance, const Vec3& outward, const Vec3&
   return before != 0 || distance <= 0 || (is_clear && std::abs(lean) > kFacing) ? t.side : 0;
 }
 
-/// Whether a contact in the direction `out` from a sector of a ring is at an end of its arc. There the surface
-/// continues with the next sector, which is nearer. The end of the arc approaches a floor while the ring rolls;
-/// the ring does not. All sectors of a ring that lies almost flat, within kOutward, may touch next.
+/// Whether a contact in the direction `out` from a sector of a ring is at an end of its arc. There the
+/// surface continues with the next sector, which is nearer. The end of the arc approaches a floor while the
+/// ring rolls; the ring does not. All sectors of a ring that lies almost flat, within kOutward, may touch
+/// next.
 bool is_beside_arc(const Convex& c, const Vec3& out) {
   constexpr Real kOutward = 0.3, kSeam = 1e-9;
   if (c.core != Convex::Core::sector) return false;

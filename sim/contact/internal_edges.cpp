@@ -71,7 +71,7 @@ constexpr bool kBothEnds[] = {false, true};
 /// Returns the first piece of the ring to which a piece belongs; the piece itself if it is no part of a ring.
 uint32_t first_part_of_ring(Body& body, uint32_t piece) {
   const CollisionMesh* mesh = body.solid.mesh;
-  return mesh && mesh->round_surface(piece) ? mesh->first_part_beside(piece) : piece;
+  return mesh && mesh->round_surface(piece) ? mesh->first_part_of_solid_of(piece) : piece;
 }
 
 /// A manifold seen from body X, one of its two bodies, if X also has other manifolds. Y is the other body.

@@ -442,12 +442,14 @@ TEST_P(InternalEdges, DoNotStopARingThatLands) {
                         .friction = 0.3});
     run(world, 1);
     const Vec3 way = world.body_motion(ring, world.time()).pose.position - start;
-    EXPECT_NEAR(way.dot(along), 2 / (0.3 * kFallAcceleration), 0.02) << x;
-    EXPECT_LT(way.cross(along).norm(), 0.02) << x;
+    // `lcp` approximates the friction cone by a pyramid, which turns the path of a ring that touches with
+    // points.
+    EXPECT_NEAR(way.dot(along), 2 / (0.3 * kFallAcceleration), is_lcp() ? 0.12 : 0.02) << x;
+    EXPECT_LT(way.cross(along).norm(), is_lcp() ? 0.13 : 0.02) << x;
   }
 }
 
-// A torus of flat sides stands on one of them or on a corner.
+// A torus stands on its outside.
 TEST_P(InternalEdges, DoNotStopAStandingRing) {
   World world(def());
   add_bricks(world, 0);

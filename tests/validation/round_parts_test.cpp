@@ -13,7 +13,7 @@ namespace {
 
 constexpr Real kWheelRadius = 0.2, kWheelSpeed = 2, kRollTime = 3;
 
-/// A wheel about the Y axis of its frame. `inertia`: about this axis, divided by the mass and kWheelRadius^2.
+/// A wheel about the Y axis of its frame.
 struct Wheel {
   const char* name;
   std::vector<SolidMesh> solids;

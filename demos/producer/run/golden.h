@@ -57,8 +57,8 @@ GoldenPlace find_golden(const std::filesystem::path& folder, const LoadedScene& 
                         const std::filesystem::path& scene_file, const std::set<std::string>& taken = {});
 
 /// Draws frames of a scene, which must have been loaded with golden_overrides(). `frames`: numbers of the
-/// frames in ascending order, from 1; those that the scene does not have are left out. Without any, the frames
-/// at a fifth and at three fifths of the scene are drawn. Throws Interrupted after a signal.
+/// frames in ascending order, from 1; those that the scene does not have are left out. Without any, the
+/// frames at a fifth and at three fifths of the scene are drawn. Throws Interrupted after a signal.
 Golden draw_golden(const LoadedScene& scene, const std::vector<int>& frames, int threads,
                    const GoldenStates& states = {}, const ProgressCallback& progress = {});
 /// Numbers of the frames that the golden of this name records; none if there is no golden.
