@@ -92,29 +92,26 @@ CollisionMesh::CollisionMesh(std::vector<SolidMesh> list) : CollisionMesh(joined
 
 /// Stores the exact solids of round parts.
 void CollisionMesh::set_round(std::vector<SolidMesh> list) {
-  const auto is_round = [](const SolidMesh& s) { return s.round_hull || !s.round_parts.empty(); };
-  if (std::ranges::none_of(list, is_round)) return;
-  round_hulls_.reserve(list.size());  // so that hulls_ may refer to them
-  flat_hulls_.reserve(list.size());
+  if (std::ranges::none_of(list, [](const SolidMesh& s) { return s.round_hull.has_value(); })) return;
   for (SolidMesh& one : list) {
-    first_parts_.push_back(static_cast<uint32_t>(round_parts_.size()));
+    exact_.push_back({static_cast<uint32_t>(round_parts_.size()), std::move(one.round_hull)});
     one.round_parts.resize(one.parts.size());
     round_parts_.insert(round_parts_.end(), one.round_parts.begin(), one.round_parts.end());
-    surfaces_.push_back(one.round_hull ? &round_hulls_.emplace_back(*one.round_hull) : nullptr);
-    if (surfaces_.back())
-      hulls_.push_back(convex(*surfaces_.back()));
-    else
-      hulls_.push_back(convex(flat_hulls_.emplace_back(convex_hull(one.mesh.vertices))));
   }
+  for (std::size_t k = 0; k < exact_.size(); ++k)
+    hulls_.push_back(exact_[k].hull ? convex(*exact_[k].hull) : convex(solids[k]->hull));
 }
 
 const RoundSolid* CollisionMesh::round_surface(uint32_t part) const {
-  return surfaces_.empty() ? nullptr : surfaces_[solid_of(part)];
+  if (exact_.empty()) return nullptr;
+  const std::optional<RoundSolid>& hull = exact_[solid_of(part)].hull;
+  return hull ? &*hull : nullptr;
 }
 
 /// Returns the index in hulls() of the solid to which a part belongs.
 std::size_t CollisionMesh::solid_of(uint32_t part) const {
-  return static_cast<std::size_t>(std::ranges::upper_bound(first_parts_, part) - first_parts_.begin()) - 1;
+  const auto after = std::ranges::upper_bound(exact_, part, {}, &Exact::first_part);
+  return static_cast<std::size_t>(after - exact_.begin()) - 1;
 }
 
 /// Returns the box of a part, which contains the exact solid, too.

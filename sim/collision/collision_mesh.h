@@ -56,9 +56,9 @@ class CollisionMesh {
   /// The exact convex hulls of the solids of a compound, if any of them is round; otherwise none.
   std::span<const Convex> hulls() const { return hulls_; }
   /// Index of the first part in hulls()[k].
-  uint32_t first_part(std::size_t k) const { return first_parts_[k]; }
+  uint32_t first_part(std::size_t k) const { return exact_[k].first_part; }
   /// Index of the first part of the solid to which a part belongs, in a compound with hulls().
-  uint32_t first_part_of_solid_of(uint32_t part) const { return first_parts_[solid_of(part)]; }
+  uint32_t first_part_of_solid_of(uint32_t part) const { return exact_[solid_of(part)].first_part; }
   /// Bounding tree of the parts of the decomposition. Its items are the indices of the parts.
   const AabbTree& part_tree() const;
   /// Returns a bounding tree of the given kind, over the triangles or over the parts. It is computed at the
@@ -74,12 +74,14 @@ class CollisionMesh {
   std::size_t solid_of(uint32_t part) const;
   Aabb part_box(uint32_t part) const;
 
-  std::vector<std::optional<RoundSolid>> round_parts_;  // empty: none
-  std::vector<RoundSolid> round_hulls_;                 // to which hulls_ refers
-  std::vector<ConvexPolyhedron> flat_hulls_;            // the same, of solids that are not round
-  std::vector<Convex> hulls_;
-  std::vector<uint32_t> first_parts_;
-  std::vector<const RoundSolid*> surfaces_;  // for each hull; null: not round
+  // These are empty unless the mesh is a compound with round parts.
+  struct Exact {
+    uint32_t first_part;
+    std::optional<RoundSolid> hull;  // nothing: the solid is not round
+  };
+  std::vector<Exact> exact_;                            // for each solid
+  std::vector<std::optional<RoundSolid>> round_parts_;  // for each part
+  std::vector<Convex> hulls_;                           // for each solid; they refer to exact_ and `solids`
   mutable std::once_flag once_;
   mutable std::optional<ConvexDecomposition> decomposition_;
   mutable AabbTree part_tree_;

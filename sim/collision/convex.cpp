@@ -61,18 +61,6 @@ Vec3 ellipsoid_support(const Vec3& half, const Vec3& d) {
   return length > 0 ? Vec3(half.cwiseProduct(scaled) / length) : Vec3(half.x(), 0, 0);
 }
 
-Real cosine(Real sine) {
-  return std::sqrt(1 - sine * sine);
-}
-
-/// Returns the support point of a sector of a ring: a point of the arc, or of one of the two ends.
-Vec3 sector_support(const Vec3& half, Real sine, const Vec3& d) {
-  const Real y = std::copysign(half.y(), d.y()), c = cosine(sine), side = std::copysign(sine, d.z());
-  if (d.x() > 0 && std::abs(d.z()) * c <= d.x() * sine) return rim(d, half.x(), y);
-  const Real r = d.x() * c + d.z() * side >= 0 ? half.x() : half.z();
-  return {r * c, y, r * side};
-}
-
 struct ConvexOf {
   Convex operator()(const Sphere& s) const { return {.core = Convex::Core::point, .radius = s.radius}; }
   Convex operator()(const Box& b) const { return {.core = Convex::Core::box, .half = b.size / 2}; }
@@ -153,12 +141,20 @@ Vec3 Convex::core_support(const Vec3& d, uint32_t& number) const {
     case Core::ellipsoid:
       return ellipsoid_support(half, d);
     case Core::sector:
-      return sector_support(half, sine, d);
+      return sector_support(d);
     case Core::polyhedron:
       number = support_vertex(*polyhedron, d, number);
       return polyhedron->vertex(number);
   }
   return Vec3::Zero();
+}
+
+/// Returns the support point of a sector of a ring: a point of the arc, or of one of the two ends.
+Vec3 Convex::sector_support(const Vec3& d) const {
+  const Real y = std::copysign(half.y(), d.y()), side = std::copysign(sine, d.z());
+  if (faces_arc(d)) return rim(d, half.x(), y);
+  const Real r = d.x() * cosine + d.z() * side >= 0 ? half.x() : half.z();
+  return {r * cosine, y, r * side};
 }
 
 Vec3 Convex::vertex(uint32_t number) const {
@@ -183,7 +179,7 @@ Vec3 Convex::core_vertex(uint32_t number) const {
 Vec3 Convex::centre() const {
   if (core == Core::triangle) return (*corners[0] + *corners[1] + *corners[2]) / 3;
   const Vec3 own = core == Core::polyhedron ? polyhedron->centre()
-                   : core == Core::sector   ? Vec3((half.x() + half.z()) / 2 * cosine(sine), 0, 0)
+                   : core == Core::sector   ? Vec3((half.x() + half.z()) / 2 * cosine, 0, 0)
                                             : Vec3::Zero();
   return place ? place->point_to_world(own) : own;
 }
@@ -210,6 +206,7 @@ Convex convex(const RoundSolid& round) {
     solid = {.core = Convex::Core::sector,
              .half = Vec3(s->radius, s->half_height, s->inner),
              .sine = s->sine,
+             .cosine = s->cosine,
              .radius = s->around};
   if (const auto* disc = std::get_if<RoundedDisc>(&round.shape))
     solid = {.core = Convex::Core::cylinder, .half = Vec3(disc->radius, 0, 0), .radius = disc->around};

@@ -4,6 +4,7 @@
 /// segment with a radius, so distances of these round shapes are exact.
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 
 #include "sim/core/types.h"
@@ -21,8 +22,8 @@ struct Convex {
   /// of the base, half height, radius of the top), where a cone's top has radius 0. Ellipsoid: half axes.
   /// Segment: half length in y. Sector of a ring: (radius, half height, radius of the inner corners).
   Vec3 half = Vec3::Zero();
-  Real sine = 0;    ///< sector: sine of half of its angle
-  Real radius = 0;  ///< radius around the core [m]
+  Real sine = 0, cosine = 1;  ///< sector: of half of its angle
+  Real radius = 0;            ///< radius around the core [m]
   const ConvexPolyhedron* polyhedron = nullptr;
   std::array<const Vec3*, 3> corners{};  ///< corners of a triangle
   /// Pose of the core in the frame of the solid; null: the frames are the same.
@@ -40,6 +41,11 @@ struct Convex {
   /// Returns the vertex of the core with a number from support(). An invalid number is mapped to some valid
   /// vertex.
   Vec3 vertex(uint32_t number) const;
+  /// For a sector and a unit vector in the frame of its core: whether this direction points out of the round
+  /// side, or beside it by at most `slack`.
+  bool faces_arc(const Vec3& d, Real slack = 0) const {
+    return d.x() > 0 && std::abs(d.z()) * cosine <= d.x() * sine + slack;
+  }
   /// A point inside the core.
   Vec3 centre() const;
   /// Upper bound of the distance of the solid's points from the origin of the frame, including the radius
@@ -49,6 +55,7 @@ struct Convex {
  private:
   Vec3 core_support(const Vec3& d, uint32_t& vertex) const;
   Vec3 core_vertex(uint32_t number) const;
+  Vec3 sector_support(const Vec3& d) const;
 };
 
 /// Returns the convex solid of a primitive. MeshShape and Plane are not accepted.

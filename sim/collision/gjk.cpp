@@ -71,9 +71,36 @@ bool is_progress(const SimplexPoint& nearer, const SimplexPoint& nearest) {
          (nearer.size > nearest.size && nearer.squared <= kGjkLevel * nearest.squared);
 }
 
+// Solids with places are compared in the frames of their cores, so that support points need no
+// transformation.
+
+Pose place_of(const Convex& c) {
+  return c.place ? *c.place : Pose{};
+}
+
+Convex without_place(Convex c) {
+  c.place = nullptr;
+  return c;
+}
+
+/// Returns the pose of B's core in the frame of A's core.
+Pose between_cores(const Convex& a, const Convex& b, const Pose& a_from_b) {
+  const Pose at_a = place_of(a), at_b = place_of(b);
+  return {at_a.point_to_body(a_from_b.point_to_world(at_b.position)),
+          at_a.orientation.conjugate() * a_from_b.orientation * at_b.orientation};
+}
+
 }  // namespace
 
 Separation gjk(const Convex& a, const Convex& b, const Pose& a_from_b, GjkCache& cache) {
+  if (a.place || b.place) {
+    const Pose at_a = place_of(a);
+    Separation s = gjk(without_place(a), without_place(b), between_cores(a, b, a_from_b), cache);
+    s.normal = at_a.vector_to_world(s.normal);
+    s.on_a = at_a.point_to_world(s.on_a);
+    s.on_b = at_a.point_to_world(s.on_b);
+    return s;
+  }
   const MinkowskiDifference m(a, b, a_from_b);
   const Real rounding = m.rounding(), size = rounding / std::numeric_limits<Real>::epsilon();
   Simplex s = first_simplex(m, cache);
@@ -116,6 +143,8 @@ Separation penetration(const Convex& a, const Convex& b, const Pose& a_from_b) {
 }
 
 bool overlap(const Convex& a, const Convex& b, const Pose& a_from_b, GjkCache& cache) {
+  if (a.place || b.place)
+    return overlap(without_place(a), without_place(b), between_cores(a, b, a_from_b), cache);
   const MinkowskiDifference m(a, b, a_from_b);
   const Real radius2 = m.radius() * m.radius();
   Simplex s;

@@ -146,8 +146,7 @@ bool is_beside_arc(const Convex& c, const Vec3& out) {
   if (c.core != Convex::Core::sector) return false;
   const Vec3 d = c.place ? c.place->vector_to_body(out) : out;
   const Real lean2 = d.x() * d.x() + d.z() * d.z();
-  return lean2 > kOutward * kOutward && d.x() > 0 &&
-         std::abs(d.z()) * std::sqrt(1 - c.sine * c.sine) > d.x() * c.sine + kSeam;
+  return lean2 > kOutward * kOutward && d.x() > 0 && !c.faces_arc(d, kSeam);
 }
 
 /// Two pieces of two shapes that are near each other, for which manifolds are computed.

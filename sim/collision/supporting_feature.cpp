@@ -350,17 +350,17 @@ SupportingFeature revolved_edge(const Convex& c, const Vec3& d, Real slack, cons
 /// Returns a flat side of a sector: one of the two ends along Y, the inside, or one of the two sides on which
 /// the neighbours in the ring lie.
 SupportingFeature sector_face(const Convex& c, const Vec3& d) {
-  const Real cosine = std::sqrt(1 - c.sine * c.sine), h = c.half.y(), across = cosine * d.x();
+  const Real h = c.half.y(), across = c.cosine * d.x();
   const auto corner = [&](bool outer, bool up, bool beyond) {
     const Real r = outer ? c.half.x() : c.half.z();
-    return Vec3(r * cosine, up ? h : -h, beyond ? r * c.sine : -r * c.sine);
+    return Vec3(r * c.cosine, up ? h : -h, beyond ? r * c.sine : -r * c.sine);
   };
   SupportingFeature f;
   const auto add = [&](bool outer, bool up, bool beyond) {
     f.add(corner(outer, up, beyond), (outer ? 1u : 0u) | (up ? 2u : 0u) | (beyond ? 4u : 0u));
   };
   const bool up = d.y() > 0, beyond = d.z() > 0;
-  const Real side = (beyond ? d.z() : -d.z()) * cosine - c.sine * d.x();
+  const Real side = (beyond ? d.z() : -d.z()) * c.cosine - c.sine * d.x();
   if (std::abs(d.y()) >= std::max(side, -across)) {
     f.normal = up ? Vec3::UnitY() : Vec3(-Vec3::UnitY());
     constexpr std::array<std::pair<bool, bool>, 4> kAround = {
@@ -373,7 +373,7 @@ SupportingFeature sector_face(const Convex& c, const Vec3& d) {
       if (outer && next_outer) f.add(Vec3(c.half.x(), up ? h : -h, 0), up ? 8 : 9);
     }
   } else if (side > -across) {
-    f.normal = Vec3(-c.sine, 0, beyond ? cosine : -cosine);
+    f.normal = Vec3(-c.sine, 0, beyond ? c.cosine : -c.cosine);
     const std::array<std::pair<bool, bool>, 4> around = {
         {{false, false}, {true, false}, {true, true}, {false, true}}};  // outer, up
     for (std::size_t k = 0; k < 4; ++k) {
@@ -391,15 +391,10 @@ SupportingFeature sector_face(const Convex& c, const Vec3& d) {
   return f;
 }
 
-/// Whether `d` points out of the round side of a sector.
-bool faces_arc(const Convex& c, const Vec3& d) {
-  return d.x() > 0 && std::abs(d.z()) * std::sqrt(1 - c.sine * c.sine) <= d.x() * c.sine;
-}
-
 /// Returns the radial direction of the arc's point that is farthest along d.
 Vec3 arc_direction(const Convex& c, const Vec3& d) {
-  if (faces_arc(c, d)) return outward(d);
-  return {std::sqrt(1 - c.sine * c.sine), 0, std::copysign(c.sine, d.z())};
+  if (c.faces_arc(d)) return outward(d);
+  return {c.cosine, 0, std::copysign(c.sine, d.z())};
 }
 
 /// Returns the line of the round side at the angle of d, or the point of the arc if the sector is flat.
@@ -419,7 +414,7 @@ SupportingFeature sector_line(const Convex& c, const Vec3& d) {
 SupportingFeature sector_feature(const Convex& c, const Vec3& d, Real slack) {
   const Real lean = d.dot(arc_direction(c, d)), width = c.half.x() - c.half.z(), length = 2 * c.half.y();
   if (!(length > 0)) return sector_line(c, d);  // of a torus, which touches with its arc
-  const Real side = std::abs(d.z()) * std::sqrt(1 - c.sine * c.sine) - c.sine * d.x();
+  const Real side = std::abs(d.z()) * c.cosine - c.sine * d.x();
   const Real flat = width * fraction_within(slack, width * std::abs(lean)) * std::abs(d.y()),
              round = length * fraction_within(slack, length * std::abs(d.y())) * lean;
   return lean > std::max(side, -d.x()) && round >= flat ? sector_line(c, d) : sector_face(c, d);
@@ -494,6 +489,16 @@ SupportingFeature core_feature(const Convex& c, const Vec3& d, Real slack) {
   }
 }
 
+/// Finds a feature of a solid with a place by find(solid), in the frame of its core.
+template <class Find>
+SupportingFeature from_core(const Convex& c, Find&& find) {
+  Convex own = c;
+  own.place = nullptr;
+  SupportingFeature f = find(own);
+  f.place(c.place->orientation.toRotationMatrix(), c.place->position);
+  return f;
+}
+
 }  // namespace
 
 void SupportingFeature::place(const Mat3& rotation, const Vec3& translation) {
@@ -505,20 +510,15 @@ void SupportingFeature::place(const Mat3& rotation, const Vec3& translation) {
 
 SupportingFeature supporting_feature(const Convex& c, const Vec3& d, Real slack) {
   if (!c.place) return core_feature(c, d, slack);
-  Convex own = c;
-  own.place = nullptr;
-  SupportingFeature f = core_feature(own, c.place->vector_to_body(d), slack);
-  f.place(c.place->orientation.toRotationMatrix(), c.place->position);
-  return f;
+  return from_core(c,
+                   [&](const Convex& own) { return core_feature(own, c.place->vector_to_body(d), slack); });
 }
 
 SupportingFeature supporting_edge(const Convex& c, const Vec3& d, Real slack, const Vec3& on_surface) {
   if (!c.place) return core_edge(c, d, slack, on_surface);
-  Convex own = c;
-  own.place = nullptr;
-  SupportingFeature f = core_edge(own, c.place->vector_to_body(d), slack, c.place->point_to_body(on_surface));
-  f.place(c.place->orientation.toRotationMatrix(), c.place->position);
-  return f;
+  return from_core(c, [&](const Convex& own) {
+    return core_edge(own, c.place->vector_to_body(d), slack, c.place->point_to_body(on_surface));
+  });
 }
 
 }  // namespace offstage::sim

@@ -93,6 +93,20 @@ struct Start {
   Vec3 sliding;  // velocity of a's material at the contact relative to b's
 };
 
+/// For the arguments see contact_motion().
+Start start_of(const Body& a, const Body& b, const Manifold& m, const Vec3& place, Real gap) {
+  const Vec3 arm_a = place - start_centre(a), arm_b = place - start_centre(b);
+  return {.a = a,
+          .b = b,
+          .surface_a = round_surface(a, m.piece_a),
+          .surface_b = round_surface(b, m.piece_b),
+          .m = m,
+          .arm_a = arm_a,
+          .arm_b = arm_b,
+          .gap = gap,
+          .sliding = first_twist(a).at(arm_a) - first_twist(b).at(arm_b)};
+}
+
 /// Whether a body is a sphere whose rotation does not move its contacts: its centre of mass is in the middle.
 bool is_centred_sphere(const Body& body) {
   return std::holds_alternative<Sphere>(body.def.shape) &&
@@ -361,17 +375,8 @@ Vec3 turned_arm(const RoundSurface& surface, const Vec3& arm, const Quat& from, 
 
 ContactPlace contact_place(const Body& a, const Body& b, const Manifold& m, const Vec3& place, Real gap,
                            Real time, Real substep) {
-  const Vec3 arm_a = place - start_centre(a), arm_b = place - start_centre(b);
-  const Start start{a,
-                    b,
-                    round_surface(a, m.piece_a),
-                    round_surface(b, m.piece_b),
-                    m,
-                    arm_a,
-                    arm_b,
-                    gap,
-                    first_twist(a).at(arm_a) - first_twist(b).at(arm_b)};
-  const ContactPlace at_start{m.normal, arm_a, arm_b, Quat::Identity()};
+  const Start start = start_of(a, b, m, place, gap);
+  const ContactPlace at_start{m.normal, start.arm_a, start.arm_b, Quat::Identity()};
   if (std::max(twist_of(a).angular_velocity.norm(), twist_of(b).angular_velocity.norm()) * substep >
       kMostPredictedTurn)
     return at_start;
@@ -385,16 +390,7 @@ ContactPlace contact_place(const Body& a, const Body& b, const Manifold& m, cons
 ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, const ContactFrame& frame,
                              const Vec3& place, Real gap, Real duration, Real substep) {
   const Twist twist_a = twist_of(a), twist_b = twist_of(b);
-  const Vec3 arm_a = place - start_centre(a), arm_b = place - start_centre(b);
-  const Start start{a,
-                    b,
-                    round_surface(a, m.piece_a),
-                    round_surface(b, m.piece_b),
-                    m,
-                    arm_a,
-                    arm_b,
-                    gap,
-                    first_twist(a).at(arm_a) - first_twist(b).at(arm_b)};
+  const Start start = start_of(a, b, m, place, gap);
   ContactMotion motion;
   motion.frame = frame;
   const bool is_face = m.source == NormalSource::face_of_a || m.source == NormalSource::face_of_b;
@@ -433,7 +429,8 @@ ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, co
     const Vec3 displacement =
         duration / 2 *
         (start.sliding -
-         (by_a ? 1 : -1) * (by_a ? twist_a : twist_b).angular_velocity.cross(by_a ? arm_a : arm_b));
+         (by_a ? 1 : -1) *
+             (by_a ? twist_a : twist_b).angular_velocity.cross(by_a ? start.arm_a : start.arm_b));
     if (by_a)
       motion.middle.arm_b += displacement;
     else

@@ -75,7 +75,9 @@ SolidMesh convex_solid(TriangleMesh mesh) {
 /// the exact solid of a sector, without its angle.
 SolidMesh ring(const std::vector<Vec2>& profile, RingSector sector) {
   SolidMesh solid{revolved_mesh(profile, true, kRoundSides), {}};
-  sector.sine = unit_circle(2 * kRoundSides)[1].y();
+  const Vec2 half_angle = unit_circle(2 * kRoundSides)[1];
+  sector.cosine = half_angle.x();
+  sector.sine = half_angle.y();
   const std::vector<Vec2> half_turns = unit_circle(4 * kRoundSides);
   for (uint32_t k = 0; k < kRoundSides; ++k) {
     std::vector<Vec3> corners;

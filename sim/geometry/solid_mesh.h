@@ -42,7 +42,7 @@ MassProperties mass_properties(const OpenBox& box);
 /// a tube (`around` = 0) or of a torus (`half_height` = 0, `inner` = `radius`); its inside is flat.
 struct RingSector {
   Real radius = 0, inner = 0, half_height = 0, around = 0;  ///< [m]
-  Real sine = 0;                                            ///< sine of half of the sector's angle
+  Real sine = 0, cosine = 1;                                ///< of half of the sector's angle
 };
 /// The convex hull of a torus: all points within `around` of a disc about Y.
 struct RoundedDisc {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <string>
+#include <tuple>
 
 #include <gtest/gtest.h>
 
@@ -11,8 +12,8 @@
 
 namespace offstage::sim {
 
-inline std::string solver_name(const testing::TestParamInfo<SolverKind>& info) {
-  switch (info.param) {
+inline std::string name_of(SolverKind solver) {
+  switch (solver) {
     case SolverKind::exact:
       return "exact";
     case SolverKind::fast:
@@ -24,6 +25,25 @@ inline std::string solver_name(const testing::TestParamInfo<SolverKind>& info) {
   }
   return "unknown";
 }
+
+inline std::string solver_name(const testing::TestParamInfo<SolverKind>& info) {
+  return name_of(info.param);
+}
+
+/// Parameters of a test: solver, steps per second.
+using SolverAndRate = std::tuple<SolverKind, int>;
+
+inline std::string solver_and_rate(const testing::TestParamInfo<SolverAndRate>& info) {
+  return name_of(std::get<0>(info.param)) + std::to_string(std::get<1>(info.param));
+}
+
+/// Instantiates a suite for the solvers of scenes, at 240 and 60 steps per second.
+#define OFFSTAGE_SOLVERS_AND_RATES(kind, suite)                                                     \
+  INSTANTIATE_TEST_SUITE_P(                                                                         \
+      kind, suite,                                                                                  \
+      testing::Combine(testing::Values(SolverKind::exact, SolverKind::fast, SolverKind::automatic), \
+                       testing::Values(240, 60)),                                                   \
+      solver_and_rate)
 
 class BothSolvers : public testing::TestWithParam<SolverKind> {
  protected:

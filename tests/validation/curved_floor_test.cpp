@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "sim/world.h"
+#include "tests/validation/both_solvers.h"
 
 namespace offstage::sim {
 namespace {
@@ -80,7 +81,7 @@ Real sliding_energy(const TroughPath& path, Real seconds) {
   return v * v / 2 + kTroughGravity * (height - kTroughBall);
 }
 
-class CurvedFloor : public testing::TestWithParam<std::tuple<SolverKind, int>> {
+class CurvedFloor : public testing::TestWithParam<SolverAndRate> {
  protected:
   static bool is_fast() { return std::get<0>(GetParam()) == SolverKind::fast; }
   static bool is_coarse() { return std::get<1>(GetParam()) == 60; }
@@ -190,17 +191,7 @@ TEST_P(CurvedFloor, NeverGivesEnergyAtCoarseSeams) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(, CurvedFloor,
-                         testing::Combine(testing::Values(SolverKind::exact, SolverKind::fast,
-                                                          SolverKind::automatic),
-                                          testing::Values(240, 60)),
-                         [](const auto& i) {
-                           const SolverKind s = std::get<0>(i.param);
-                           return std::string(s == SolverKind::exact  ? "exact"
-                                              : s == SolverKind::fast ? "fast"
-                                                                      : "auto") +
-                                  std::to_string(std::get<1>(i.param));
-                         });
+OFFSTAGE_SOLVERS_AND_RATES(Solvers, CurvedFloor);
 
 }  // namespace
 }  // namespace offstage::sim

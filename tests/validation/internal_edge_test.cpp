@@ -442,10 +442,16 @@ TEST_P(InternalEdges, DoNotStopARingThatLands) {
                         .friction = 0.3});
     run(world, 1);
     const Vec3 way = world.body_motion(ring, world.time()).pose.position - start;
-    // `lcp` approximates the friction cone by a pyramid, which turns the path of a ring that touches with
-    // points.
-    EXPECT_NEAR(way.dot(along), 2 / (0.3 * kFallAcceleration), is_lcp() ? 0.12 : 0.02) << x;
-    EXPECT_LT(way.cross(along).norm(), is_lcp() ? 0.13 : 0.02) << x;
+    const Real stops = 2 / (0.3 * kFallAcceleration);
+    if (is_lcp()) {
+      // Each of two tangents has its own limit of friction, so the force is up to sqrt(2) times that of the
+      // cone.
+      EXPECT_GT(way.norm(), stops / std::numbers::sqrt2) << x;
+      EXPECT_LT(way.norm(), stops + 0.02) << x;
+      continue;
+    }
+    EXPECT_NEAR(way.dot(along), stops, 0.02) << x;
+    EXPECT_LT(way.cross(along).norm(), 0.02) << x;
   }
 }
 

@@ -14,8 +14,7 @@ constexpr std::array kAllSolvers = {SolverKind::exact, SolverKind::fast, SolverK
 constexpr std::array kBothSteps = {1.0 / 240, 1.0 / 60};
 
 std::string named(SolverKind solver, Real step) {
-  const char* name = solver == SolverKind::exact ? "exact" : solver == SolverKind::fast ? "fast" : "auto";
-  return name + std::string(" at 1/") + std::to_string(std::lround(1 / step)) + " s";
+  return name_of(solver) + " at 1/" + std::to_string(std::lround(1 / step)) + " s";
 }
 
 /// A column of balls of 1 m diameter above a floor.

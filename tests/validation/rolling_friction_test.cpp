@@ -14,6 +14,7 @@
 #include <gtest/gtest.h>
 
 #include "sim/world.h"
+#include "tests/validation/both_solvers.h"
 
 namespace offstage::sim {
 namespace {
@@ -184,17 +185,7 @@ TEST_P(TurningFriction, ACartIsSlowedByItsWheels) {
   EXPECT_NEAR(w.body(chassis).velocity.x(), 3 - 3 * deceleration, tolerance * 3 * deceleration);
 }
 
-INSTANTIATE_TEST_SUITE_P(Solvers, TurningFriction,
-                         testing::Combine(testing::Values(SolverKind::exact, SolverKind::fast,
-                                                          SolverKind::automatic),
-                                          testing::Values(240, 60)),
-                         [](const testing::TestParamInfo<std::tuple<SolverKind, int>>& test) {
-                           const SolverKind kind = std::get<0>(test.param);
-                           return std::string(kind == SolverKind::exact  ? "exact"
-                                              : kind == SolverKind::fast ? "fast"
-                                                                         : "auto") +
-                                  "_" + std::to_string(std::get<1>(test.param));
-                         });
+OFFSTAGE_SOLVERS_AND_RATES(Solvers, TurningFriction);
 
 TEST(TurningFrictionInput, IsChecked) {
   World w;

@@ -12,6 +12,7 @@
 
 #include "sim/world.h"
 #include "solids.h"
+#include "tests/validation/both_solvers.h"
 
 namespace offstage::sim {
 namespace {
@@ -444,19 +445,7 @@ TEST_P(MovingContact, HingedBoxesOnATurntableStayWhereTheyAre) {
   }
 }
 
-std::string name_of(const testing::TestParamInfo<std::tuple<SolverKind, int>>& info) {
-  const SolverKind kind = std::get<0>(info.param);
-  const char* const name = kind == SolverKind::exact  ? "exact"
-                           : kind == SolverKind::fast ? "fast"
-                                                      : "automatic";
-  return name + std::to_string(std::get<1>(info.param));
-}
-
-INSTANTIATE_TEST_SUITE_P(Solvers, MovingContact,
-                         testing::Combine(testing::Values(SolverKind::exact, SolverKind::fast,
-                                                          SolverKind::automatic),
-                                          testing::Values(60, 240)),
-                         name_of);
+OFFSTAGE_SOLVERS_AND_RATES(Solvers, MovingContact);
 
 /// Simulates a heap of boxes, balls and cylinders that fall and slide, and returns their poses. The bodies
 /// are added in a permuted order.

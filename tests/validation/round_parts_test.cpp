@@ -7,6 +7,7 @@
 
 #include "sim/geometry/solid_mesh.h"
 #include "sim/world.h"
+#include "tests/validation/both_solvers.h"
 
 namespace offstage::sim {
 namespace {
@@ -60,7 +61,7 @@ BodyDef wheel_body(World& w, const Wheel& wheel, const Vec3& position, Real tilt
 }
 
 /// Parameters: solver, steps per second.
-class RoundParts : public testing::TestWithParam<std::tuple<SolverKind, int>> {
+class RoundParts : public testing::TestWithParam<SolverAndRate> {
  protected:
   static World world(const Vec3& gravity, Ground ground) {
     World w({.gravity = gravity,
@@ -141,17 +142,7 @@ TEST_P(RoundParts, HaveHoles) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Solvers, RoundParts,
-                         testing::Combine(testing::Values(SolverKind::exact, SolverKind::fast,
-                                                          SolverKind::automatic),
-                                          testing::Values(240, 60)),
-                         [](const auto& i) {
-                           const SolverKind s = std::get<0>(i.param);
-                           return std::string(s == SolverKind::exact  ? "exact"
-                                              : s == SolverKind::fast ? "fast"
-                                                                      : "auto") +
-                                  std::to_string(std::get<1>(i.param));
-                         });
+OFFSTAGE_SOLVERS_AND_RATES(Solvers, RoundParts);
 
 }  // namespace
 }  // namespace offstage::sim

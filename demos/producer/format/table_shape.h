@@ -141,8 +141,7 @@ struct Table<sim::Torus> {
   static constexpr const char* kName = "torus";
   static constexpr const char* kHelp =
       "A ring about y, centred on the body. It collides as 48 convex sectors, which are round on the "
-      "outside; "
-      "its mass is exact.";
+      "outside; its mass is exact.";
   static Fields<sim::Torus> fields() {
     return {
         {"radius", &sim::Torus::radius, "distance of the tube's centre line from the axis", "m", kPositive},
