@@ -342,9 +342,12 @@ bool runs_along(const Body& body, Real duration) {
   return has_revolved_part(body) && turn.squaredNorm() > kStraight * kStraight;
 }
 
-Real rim_speed(const Body& body, const Vec3& normal) {
-  if (!body.is_awake() || body.solid.mesh || !has_revolved_part(body)) return 0;
-  const Vec3 axis = body.start.orientation * Vec3::UnitY(), lean = normal.cross(axis);
+Real rim_speed(const Body& body, uint32_t piece, const Vec3& normal) {
+  if (!body.is_awake() || !has_revolved_part(body)) return 0;
+  const RoundSurface surface = round_surface(body, piece);
+  if (!surface.is_revolved()) return 0;
+  const Vec3 axis = body.start.orientation * (surface.place.orientation * Vec3::UnitY()),
+             lean = normal.cross(axis);
   if (lean.norm() < kUpright || std::abs(normal.dot(axis)) < kUpright) return 0;
   return std::abs(body.start_twist.angular_velocity.cross(axis).dot(lean)) / lean.squaredNorm();
 }

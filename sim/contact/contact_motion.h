@@ -51,10 +51,11 @@ Vec3 start_centre(const Body& body);
 /// and a noticeable rotation within `duration` [s].
 bool runs_along(const Body& body, Real duration);
 
-/// Returns the angular speed at which the axis of a cylinder, cone or frustum turns about the normal of a
-/// contact at the interval's start [rad/s]. The lowest point of a tilted rim moves around the rim at this
-/// speed, for example on a wobbling coin. Returns 0 if a face or a side lies flat, and for other shapes.
-Real rim_speed(const Body& body, const Vec3& normal);
+/// Returns the angular speed at which the axis of a cylinder, cone, frustum, tube or torus turns about the
+/// normal of a contact of this piece at the interval's start [rad/s]. The lowest point of a tilted rim moves
+/// around the rim at this speed, for example on a wobbling coin. Returns 0 if a face or a side lies flat, and
+/// for other shapes.
+Real rim_speed(const Body& body, uint32_t piece, const Vec3& normal);
 
 /// Predicts the motion of a contact of a manifold. `frame` is the manifold's frame. `place` is the contact's
 /// world position at the interval's start, in the middle between both surfaces. `gap` is the distance of the

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/contact/round_surface.h"
 #include "sim/core/rotation.h"
 
 namespace offstage::sim {
@@ -16,14 +17,15 @@ constexpr Real kSpinExcess = 1e-3;
 /// momentum.
 constexpr Real kAligned = 0.995;
 
-/// Returns the material point of a round body that represents a place on its surface: a point of the axis, or
-/// the centre. The surface turns through the contact; these points do not.
-Vec3 core_point(const Body& body, const Vec3& place) {
-  const Shape& shape = body.def.shape;
-  if (std::holds_alternative<Sphere>(shape)) return body.start_pose.position;
-  if (!is_round_about_axis(shape)) return place;
-  const Vec3 local = body.start_pose.point_to_body(place);
-  return body.start_pose.point_to_world(Vec3(0, local.y(), 0));
+/// Returns the material point of a round body that represents a place on the surface of a piece: a point of
+/// the axis, or the centre. The surface turns through the contact; these points do not.
+Vec3 core_point(const Body& body, uint32_t piece, const Vec3& place) {
+  const RoundSurface surface = round_surface(body, piece);
+  const bool is_ball = std::holds_alternative<Sphere>(*surface.shape);
+  if (!is_ball && !is_round_about_axis(*surface.shape)) return place;
+  const Vec3 local = surface.place.point_to_body(body.start_pose.point_to_body(place));
+  const Vec3 on_axis(0, is_ball ? 0 : local.y(), 0);
+  return body.start_pose.point_to_world(surface.place.point_to_world(on_axis));
 }
 
 struct PointRates {
@@ -112,8 +114,10 @@ void agree_with_spin(RigidBody& r, const Vec3& expected, Real free_energy, Real 
 Vec3 velocity_bias(const ContactPair& pair, const PlacedManifold& placed, const ContactPoint& point, Real h) {
   const Manifold& m = placed.manifold;
   if (is_face(m.source) && spin(pair.a()) < kNoSpin && spin(pair.b()) < kNoSpin) return Vec3::Zero();
-  const Vec3 place_a = m.source == NormalSource::face_of_a ? point.on_a : core_point(pair.a(), point.on_a);
-  const Vec3 place_b = m.source == NormalSource::face_of_b ? point.on_b : core_point(pair.b(), point.on_b);
+  const Vec3 place_a =
+      m.source == NormalSource::face_of_a ? point.on_a : core_point(pair.a(), m.piece_a, point.on_a);
+  const Vec3 place_b =
+      m.source == NormalSource::face_of_b ? point.on_b : core_point(pair.b(), m.piece_b, point.on_b);
   const PointRates a = rates(pair.a(), place_a), b = rates(pair.b(), place_b);
   const Vec3 n_rate =
       is_face(m.source)

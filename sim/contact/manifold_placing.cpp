@@ -3,6 +3,8 @@
 #include <cmath>
 #include <utility>
 
+#include "sim/contact/round_surface.h"
+
 namespace offstage::sim {
 namespace {
 
@@ -12,13 +14,12 @@ namespace {
 /// rim, and the velocity of the material at the start does not show this motion.
 class LeaningRim {
  public:
-  /// Prepares the corrections if the shape has a rim. `core`: pose of the shape in the frame of the manifold.
-  /// `out`: direction towards the face.
-  LeaningRim(const Shape& shape, const Pose& core, const Vec3& out) : core_(core) {
-    if (!std::holds_alternative<Cylinder>(shape) && !std::holds_alternative<Cone>(shape) &&
-        !std::holds_alternative<Frustum>(shape))
-      return;
-    const Vec3 facing = core.vector_to_body(out);
+  /// Prepares the corrections if the surface has a sharp rim. `body`: pose of the body in the frame of the
+  /// manifold. `out`: direction towards the face.
+  LeaningRim(const RoundSurface& surface, const Pose& body, const Vec3& out)
+      : core_{body.point_to_world(surface.place.position), body.orientation * surface.place.orientation} {
+    if (!surface.is_revolved() || surface.around > 0) return;
+    const Vec3 facing = core_.vector_to_body(out);
     const Real lean = std::hypot(facing.x(), facing.z());
     if (lean > kLeast) facing_ = {facing.x() / lean, facing.z() / lean};
   }
@@ -81,8 +82,8 @@ void place_manifold(const Manifold& local, const Pose& from, Manifold& m) {
 void follow_rims(Manifold& m, const Body& a, const Body& b, const Pose& a_from_b) {
   const bool on_a = m.source == NormalSource::face_of_b, on_b = m.source == NormalSource::face_of_a;
   if (!on_a && !on_b) return;
-  const LeaningRim rim =
-      on_a ? LeaningRim(a.def.shape, Pose{}, -m.normal) : LeaningRim(b.def.shape, a_from_b, m.normal);
+  const LeaningRim rim = on_a ? LeaningRim(round_surface(a, m.piece_a), Pose{}, -m.normal)
+                              : LeaningRim(round_surface(b, m.piece_b), a_from_b, m.normal);
   if (!rim.leans()) return;
   const auto on_rim = [on_a](ContactPoint& p) -> Vec3& { return on_a ? p.on_a : p.on_b; };
   uint32_t lowest = 0;

@@ -149,8 +149,8 @@ void ImpactStage::add_rim_updates() {
     if (pair->touching() == 0) continue;
     Real turn = 0;
     for (const PlacedManifold& m : pair->manifolds())
-      for (const Body* body : {&pair->a(), &pair->b()})
-        turn = std::max(turn, h_ * rim_speed(*body, m.frame.n));
+      turn = std::max({turn, h_ * rim_speed(pair->a(), m.manifold.piece_a, m.frame.n),
+                       h_ * rim_speed(pair->b(), m.manifold.piece_b, m.frame.n)});
     if (turn <= kFastRimPieces.turn) continue;
     const Body& body = pair->a().is_awake() ? pair->a() : pair->b();
     const bool is_single = islands_[body.island].bodies.size() == 1;
