@@ -139,10 +139,10 @@ int set_side(SurfaceTriangle& t, Real distance, const Vec3& outward, const Vec3&
 
 /// Whether a contact in the direction `out` from a sector of a ring is at an end of its arc. There the
 /// surface continues with the next sector, which is nearer. The end of the arc approaches a floor while the
-/// ring rolls; the ring does not. All sectors of a ring that lies almost flat, within kOutward, may touch
-/// next.
+/// ring rolls or wobbles; the ring does not. If the sine of the ring's lean is below kOutward, the direction
+/// around the axis is too inaccurate, and the ring lies on all of its sectors.
 bool is_beside_arc(const Convex& c, const Vec3& out) {
-  constexpr Real kOutward = 0.3, kSeam = 1e-9;
+  constexpr Real kOutward = 0.02, kSeam = 1e-9;
   if (c.core != Convex::Core::sector) return false;
   const Vec3 d = c.place ? c.place->vector_to_body(out) : out;
   const Real lean2 = d.x() * d.x() + d.z() * d.z();
