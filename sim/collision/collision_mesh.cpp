@@ -104,8 +104,8 @@ void CollisionMesh::set_round(std::vector<SolidMesh> list) {
 
 const RoundSolid* CollisionMesh::round_surface(uint32_t part) const {
   if (exact_.empty()) return nullptr;
-  const std::optional<RoundSolid>& hull = exact_[solid_of(part)].hull;
-  return hull ? &*hull : nullptr;
+  const std::optional<RoundSolid>& exact = exact_[solid_of(part)].hull;
+  return exact ? &*exact : nullptr;
 }
 
 /// Returns the index in hulls() of the solid to which a part belongs.
