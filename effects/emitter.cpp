@@ -16,6 +16,9 @@ constexpr Real kMaxClearing = 1;
 /// Number of random places on a mesh that are tried for one particle. If half of the surface is occupied,
 /// most random places are not free.
 constexpr uint32_t kTries = 64;
+/// Where new particles keep their distance from living ones, room is sought again after the time in which a
+/// particle moves by this fraction of its diameter, but at most this number of times in a sub-step.
+constexpr Real kClearedPart = 0.25, kMaxRetries = 16;
 
 std::string owner(const EmitterDef& def) {
   return "emitter \"" + def.name + "\"";
@@ -65,6 +68,7 @@ Emitter::Emitter(const EmitterDef& def, sim::ParticleSystemHandle target, Real o
       random_(def.seed, stream_id(def.name)),
       surface_(surface_of(def)),
       schedule_(def, origin),
+      retry_(-std::numeric_limits<Real>::infinity()),
       turn_{0, 0, 0} {
   if (!def_.release.direction.isZero()) def_.release.direction.normalize();
 }
@@ -117,6 +121,7 @@ void Emitter::emit(sim::World& world, Real start, Real end) {
   collect_along_path(world, start, end);
   std::stable_sort(due_.begin(), due_.end(),
                    [](const Release& a, const Release& b) { return a.time < b.time; });
+  find_neighbours(world, start, end);
   // The list may grow during the loop, because the postponed rest of a release may be due within this
   // sub-step.
   for (std::size_t i = 0; i < due_.size(); ++i) release(world, Release(due_[i]), start, end);
@@ -136,25 +141,41 @@ Real Emitter::largest_diameter(uint64_t count, Real birth_time) const {
   return 2 * radius;
 }
 
+/// Finds the living particles that new ones must not overlap in this sub-step.
+void Emitter::find_neighbours(const sim::World& world, Real start, Real end) {
+  meets_particles_ = !due_.empty() && !def_.release.overlap && Neighbours::exist(world, target_);
+  if (!meets_particles_) return;
+  const auto centre = [&](Real time) {
+    const Vec3& own = def_.surface.pose.position;
+    return def_.body ? world.body_motion(def_.body, time).pose.point_to_world(own) : own;
+  };
+  uint64_t count = 0;
+  for (const Release& r : due_) count += r.count;
+  const Vec3 first = centre(start), last = centre(end);
+  const Real reach = surface_.reach() + largest_diameter(count, start) + (last - first).norm() / 2;
+  neighbours_.collect(world, target_, (first + last) / 2, reach, start, end);
+}
+
 void Emitter::release(sim::World& world, const Release& r, Real start, Real end) {
+  if (meets_particles_ && r.time < retry_) {
+    report_.waited += r.waited ? 0 : r.count;
+    return postpone({retry_, r.count, r.together, true}, end);
+  }
   const uint64_t alive = world.particles(target_).size();
   const uint64_t allowed =
       std::min(r.count, def_.particles.max_alive > alive ? def_.particles.max_alive - alive : 0);
   if (allowed > 0) {
     // Without waiting, particles that were due earlier belong to the prewarm.
     const Real birth_time = r.waited ? std::max(r.time, start) : r.time;
-    const Batch batch{allowed, birth_time, end, largest_diameter(allowed, birth_time),
+    const Batch batch{allowed,
+                      r.together,
+                      birth_time,
+                      end,
+                      largest_diameter(allowed, birth_time),
                       def_.body ? world.body_motion(def_.body, std::max(birth_time, start)) : sim::Motion{}};
-    const uint64_t placed = def_.release.overlap   ? place_anywhere(world, batch)
-                            : surface_.has_cells() ? place_in_cells(world, batch)
-                                                   : place_apart(world, batch);
+    const uint64_t placed = place(world, batch);
     report_.released += placed;
-    if (placed < allowed) {
-      const Real speed = std::abs(mean(def_.particles.speed, birth_time - origin_));
-      const Real clearing = std::min(kMaxClearing, batch.diameter / speed);
-      if (!r.waited) report_.waited += allowed - placed;
-      wait({birth_time + clearing, allowed - placed, true}, end);
-    }
+    if (placed < allowed) wait(batch, allowed - placed, r.waited, start);
   }
   // Particles over the limit also use up their numbers, so that the random numbers of other particles do not
   // depend on the limit.
@@ -162,13 +183,43 @@ void Emitter::release(sim::World& world, const Release& r, Real start, Real end)
   number_ += r.count - allowed;
 }
 
-/// Postpones the rest of a release; the list of postponed releases stays in order of time.
-void Emitter::wait(const Release& rest, Real end) {
+/// Postpones the rest of a release until there may be room.
+void Emitter::wait(const Batch& batch, uint64_t rest, bool waited, Real start) {
+  const Real speed = std::abs(mean(def_.particles.speed, batch.birth_time - origin_));
+  const Real clearing = std::min(kMaxClearing, batch.diameter / speed);
+  if (!waited) report_.waited += rest;
+  Real next = batch.birth_time + clearing;
+  if (meets_particles_) {
+    const Real pause = std::max(kClearedPart * clearing, (batch.end - start) / kMaxRetries);
+    next = retry_ = std::min(batch.birth_time + pause, batch.end);
+  }
+  postpone({next, rest, batch.together, true}, batch.end);
+}
+
+/// Adds a release to the postponed ones, which stay in order of time. Those that wait for the same attempt
+/// are joined, so that their number is bounded.
+void Emitter::postpone(const Release& rest, Real end) {
   if (rest.time > stopped_) return;
-  auto& list = rest.time <= end ? due_ : waiting_;
-  const auto after = std::upper_bound(list.begin(), list.end(), rest,
-                                      [](const Release& a, const Release& b) { return a.time < b.time; });
+  auto& list = rest.time < end ? due_ : waiting_;
+  const auto [same, after] = std::ranges::equal_range(list, rest.time, {}, &Release::time);
+  for (Release& r : std::ranges::subrange(same, after))
+    if (r.waited && r.together == rest.together) {
+      r.count += rest.count;
+      return;
+    }
   list.insert(after, rest);
+}
+
+/// Returns the number of particles for which there was room.
+uint64_t Emitter::place(sim::World& world, const Batch& batch) {
+  if (def_.release.overlap) return place_anywhere(world, batch);
+  const bool in_cells = surface_.has_cells() && (batch.together || !meets_particles_);
+  if (meets_particles_)
+    neighbours_.place_into(spacing_, batch.count, batch.diameter, batch.birth_time, batch.carrier.pose,
+                           def_.surface.pose);
+  else if (!in_cells)
+    spacing_.reset(batch.count, batch.diameter);
+  return in_cells ? place_in_cells(world, batch) : place_apart(world, batch);
 }
 
 uint64_t Emitter::place_anywhere(sim::World& world, const Batch& batch) {
@@ -179,14 +230,20 @@ uint64_t Emitter::place_anywhere(sim::World& world, const Batch& batch) {
   return batch.count;
 }
 
+/// Places particles until no cell of the surface is free.
 uint64_t Emitter::place_in_cells(sim::World& world, const Batch& batch) {
   const Cells cells = surface_.cells(batch.diameter);
-  const uint64_t n = cells.count(), placed = std::min(batch.count, n);
+  const uint64_t n = cells.count();
   const Permutation shuffled(n, def_.seed);
-  begin_cells(cells, placed);
-  for (uint64_t k = 0; k < placed; ++k) {
-    const Draws draw(random_, number_++, batch.birth_time - origin_);
-    add(world, draw, surface_.cell(cells, shuffled(cell_cursor_++ % n), turn_), batch);
+  begin_cells(cells, std::min(batch.count, n));
+  uint64_t placed = 0;
+  for (uint64_t tried = 0; placed < batch.count && tried < n; ++tried) {
+    const Draws draw(random_, number_, batch.birth_time - origin_);
+    const Place place = surface_.cell(cells, shuffled(cell_cursor_++ % n), turn_);
+    if (meets_particles_ && !is_free(place, draw)) continue;
+    add(world, draw, place, batch);
+    ++placed;
+    ++number_;
   }
   return placed;
 }
@@ -205,7 +262,6 @@ void Emitter::begin_cells(const Cells& cells, uint64_t count) {
 
 /// Places particles until there is no room for the next one; the next call starts with that particle.
 uint64_t Emitter::place_apart(sim::World& world, const Batch& batch) {
-  spacing_.reset(batch.count, batch.diameter);
   for (uint64_t k = 0; k < batch.count; ++k, ++number_) {
     const Draws draw(random_, number_, batch.birth_time - origin_);
     const Real radius = draw(def_.particles.radius, kRadius);
@@ -213,11 +269,17 @@ uint64_t Emitter::place_apart(sim::World& world, const Batch& batch) {
     uint32_t t = 0;
     do {
       if (t == kTries) return k;
-      place = surface_.anywhere(draw.uniforms(kPlace + 3 * t++));
-    } while (!spacing_.add(place.point + radius * place.normal, radius));
+      place = surface_.anywhere(draw.uniforms(kPlace + 3 * t++), radius);
+    } while (!is_free(place, draw));
     add(world, draw, place, batch);
   }
   return batch.count;
+}
+
+/// Whether the next particle has room at a place; if so, the place is occupied from now on.
+bool Emitter::is_free(const Place& place, const Draws& draw) {
+  const Real radius = draw(def_.particles.radius, kRadius);
+  return spacing_.add(place.point + radius * place.normal, radius);
 }
 
 /// Adds a particle that touches the surface from outside.
@@ -239,6 +301,7 @@ void Emitter::add(sim::World& world, const Draws& draw, const Place& place, cons
       own + fraction * batch.carrier.velocity + fraction * batch.carrier.angular_velocity.cross(arm);
   if (def_.release.recoil && def_.body) world.add_impulse(def_.body, -particle.mass * own, particle.position);
   world.add_particle(target_, particle, batch.end - batch.birth_time);
+  if (meets_particles_) neighbours_.add(particle, batch.birth_time);
 }
 
 }  // namespace offstage::effects

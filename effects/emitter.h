@@ -3,11 +3,14 @@
 /// particle is created at its own time within the step, from the position of the surface at that time.
 ///
 /// Particles of one release never overlap. On a plane, a sphere or a disc each particle gets a cell, in
-/// shuffled order; on a mesh its distance to the others is checked. Particles for which there is no room are
-/// released later. The schedule depends only on the emitter's own clock, so that numbers and distribution are
-/// the same at any frame rate.
+/// shuffled order; on a mesh its distance to the others is checked. Particles that collide with particles do
+/// not overlap living ones, either; those of `rate` are then placed anywhere on the surface, since particles
+/// from the middles of few cells would build towers. Particles for which there is no room are released later.
+/// The schedule depends only on the emitter's own clock, so that numbers and distribution are the same at any
+/// frame rate.
 
 #include "effects/emitter_def.h"
+#include "effects/neighbours.h"
 #include "effects/schedule.h"
 #include "effects/spacing.h"
 
@@ -46,6 +49,7 @@ class Emitter {
   /// A release in progress.
   struct Batch {
     uint64_t count;
+    bool together;
     Real birth_time, end;
     Real diameter;  // largest diameter of its particles
     sim::Motion carrier;
@@ -53,13 +57,17 @@ class Emitter {
 
   void collect_along_path(const sim::World& world, Real start, Real end);
   void collect_due(Real end);
+  void find_neighbours(const sim::World& world, Real start, Real end);
+  uint64_t place(sim::World& world, const Batch& batch);
   void release(sim::World& world, const Release& r, Real start, Real end);
-  void wait(const Release& rest, Real end);
+  void wait(const Batch& batch, uint64_t rest, bool waited, Real start);
+  void postpone(const Release& rest, Real end);
   Real largest_diameter(uint64_t count, Real birth_time) const;
   uint64_t place_anywhere(sim::World& world, const Batch& batch);
   uint64_t place_in_cells(sim::World& world, const Batch& batch);
   uint64_t place_apart(sim::World& world, const Batch& batch);
   void begin_cells(const Cells& cells, uint64_t count);
+  bool is_free(const Place& place, const Draws& draw);
   void add(sim::World& world, const Draws& draw, const Place& place, const Batch& batch);
 
   EmitterDef def_;
@@ -69,6 +77,9 @@ class Emitter {
   ReleaseSurface surface_;
   Schedule schedule_;
   Spacing spacing_;
+  Neighbours neighbours_;
+  bool meets_particles_ = false;  // whether its particles collide with particles
+  Real retry_;                    // no particle that collides with particles is released before this time [s]
   EmitterReport report_;
   uint64_t number_ = 0;        // number of the next particle, on which its random numbers depend
   Real path_fraction_ = 0;     // fraction of the next particle of rate_per_metre that is already due, below 1

@@ -34,7 +34,8 @@ struct EmitterRelease {
   bool recoil =
       false;  ///< whether a dynamic body gets the opposite of the particles' momentum relative to it
   /// Whether particles may overlap when they are released. They are then placed anywhere on the surface and
-  /// never postponed. Use it for particles that do not collide with each other.
+  /// never postponed. Use it for particles that do not collide with each other. If false, particles that are
+  /// released together do not overlap, and those that collide with particles do not overlap living ones.
   bool overlap = false;
   Varying rate = 100.0;  ///< particles per second, released one by one; 0: only `count` and bursts
   /// Particles per metre of the path of the emitter's origin [1/m], >= 0. They are distributed evenly along

@@ -46,11 +46,13 @@ ReleaseSurface::ReleaseSurface(const EmitterSurface& surface)
     case SurfaceKind::plane:
       if (!(size_.x() > 0 && size_.y() > 0)) throw std::invalid_argument("surface.size must be > 0");
       area_ = size_.prod();
+      reach_ = size_.norm() / 2;
       break;
     case SurfaceKind::sphere:
     case SurfaceKind::disc:
       if (!(radius_ > 0)) throw std::invalid_argument("surface.radius must be > 0");
       area_ = (kind_ == SurfaceKind::sphere ? 4 : 1) * kPi * radius_ * radius_;
+      reach_ = radius_;
       break;
     case SurfaceKind::mesh:
       add_faces(surface.mesh);
@@ -68,6 +70,7 @@ void ReleaseSurface::add_faces(const sim::TriangleMesh& mesh) {
     const Vec3 e1 = mesh.vertices[t[1]] - p, e2 = mesh.vertices[t[2]] - p, cross = e1.cross(e2);
     const Real twice = cross.norm();
     if (!(twice > 0)) continue;
+    for (uint32_t corner : t) reach_ = std::max(reach_, mesh.vertices[corner].norm());
     faces_.push_back({p, e1, e2, cross / twice, area_});
     area_ += twice / 2;
   }
@@ -102,14 +105,16 @@ Place ReleaseSurface::cell(const Cells& cells, uint64_t i, const std::array<Real
           Vec3::UnitY(), Vec3::UnitX()};
 }
 
-Place ReleaseSurface::anywhere(const std::array<Real, 3>& u) const {
+Place ReleaseSurface::anywhere(const std::array<Real, 3>& u, Real margin) const {
+  const auto inner = [&](Real width) { return std::max(0.0, width - 2 * margin); };
   switch (kind_) {
     case SurfaceKind::plane:
-      return {Vec3((u[0] - 0.5) * size_.x(), 0, (u[1] - 0.5) * size_.y()), Vec3::UnitY(), Vec3::UnitX()};
+      return {Vec3((u[0] - 0.5) * inner(size_.x()), 0, (u[1] - 0.5) * inner(size_.y())), Vec3::UnitY(),
+              Vec3::UnitX()};
     case SurfaceKind::sphere:
       return on_sphere(1 - 2 * u[0], 2 * kPi * u[1]);
     case SurfaceKind::disc:
-      return on_disc(radius_ * std::sqrt(u[0]), 2 * kPi * u[1]);
+      return on_disc(inner(2 * radius_) / 2 * std::sqrt(u[0]), 2 * kPi * u[1]);
     default:
       return on_mesh(u);
   }

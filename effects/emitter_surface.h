@@ -56,10 +56,12 @@ class ReleaseSurface {
   /// Returns the centre of cell i. Cells of the sphere and the disc are on a spiral, which is rotated by
   /// `turn`, three uniform random numbers, so that no direction is preferred even with few cells.
   Place cell(const Cells& cells, uint64_t i, const std::array<Real, 3>& turn) const;
-  /// Returns a uniformly distributed place for three uniform random numbers in (0, 1).
-  Place anywhere(const std::array<Real, 3>& u) const;
+  /// Returns a uniformly distributed place for three uniform random numbers in (0, 1). On a plane and a disc
+  /// its distance from the border is at least `margin` [m], or as large as possible.
+  Place anywhere(const std::array<Real, 3>& u, Real margin = 0) const;
 
-  Real area() const { return area_; }  ///< [m^2]
+  Real area() const { return area_; }    ///< [m^2]
+  Real reach() const { return reach_; }  ///< greatest distance of a point from the origin [m]
 
  private:
   struct Face {
@@ -74,7 +76,7 @@ class ReleaseSurface {
 
   SurfaceKind kind_;
   Eigen::Vector2d size_;
-  Real radius_, area_ = 0;
+  Real radius_, area_ = 0, reach_ = 0;
   std::vector<Face> faces_;
 };
 

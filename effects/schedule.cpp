@@ -89,7 +89,7 @@ void Schedule::collect_singles(Real end, std::vector<Release>& due) {
 void Schedule::collect_periodic(Real end, std::vector<Release>& due) {
   while (next_periodic_ <= end) {
     if (open(next_periodic_))
-      due.push_back({next_periodic_, rounded(draw(count_, periodic_, kCount, next_periodic_))});
+      due.push_back({next_periodic_, rounded(draw(count_, periodic_, kCount, next_periodic_)), true});
     ++periodic_;
     const auto* constant = std::get_if<Real>(&interval_);
     next_periodic_ = constant ? start_ + static_cast<Real>(periodic_) * *constant
@@ -103,7 +103,7 @@ void Schedule::collect_bursts(Real end, std::vector<Release>& due) {
     for (uint64_t& cycle = burst_cycles_[i]; cycle < static_cast<uint64_t>(b.cycles); ++cycle) {
       const Real time = origin_ + b.time + static_cast<Real>(cycle) * b.interval;
       if (time > end) break;
-      due.push_back({time, rounded(draw(b.count, cycle, kBurst + static_cast<uint32_t>(i), time))});
+      due.push_back({time, rounded(draw(b.count, cycle, kBurst + static_cast<uint32_t>(i), time)), true});
     }
   }
 }

@@ -13,7 +13,8 @@ namespace offstage::effects {
 struct Release {
   Real time;
   uint64_t count;
-  bool waited = false;  ///< whether the release was postponed for lack of room on the surface
+  bool together = false;  ///< whether the particles are released together, as by `count` and bursts
+  bool waited = false;    ///< whether the release was postponed for lack of room on the surface
 };
 
 class Schedule {

@@ -20,6 +20,10 @@ void Spacing::reset(uint64_t count, Real diameter) {
   balls_.clear();
 }
 
+Cell Spacing::cell_at(const Vec3& point) const {
+  return (point / edge_).array().floor().cast<int64_t>();
+}
+
 uint32_t& Spacing::bucket(const Cell& cell) {
   const auto key = [&](int axis) { return static_cast<uint64_t>(cell[axis]); };
   return buckets_[combined(combined(key(0), key(1)), key(2)) & (buckets_.size() - 1)];
@@ -35,15 +39,19 @@ bool Spacing::is_clear(const Cell& cell, const Vec3& centre, Real radius) {
 }
 
 bool Spacing::add(const Vec3& centre, Real radius) {
-  const Cell middle = (centre / edge_).array().floor().cast<int64_t>();
+  const Cell middle = cell_at(centre);
   for (int64_t x = -1; x <= 1; ++x)
     for (int64_t y = -1; y <= 1; ++y)
       for (int64_t z = -1; z <= 1; ++z)
         if (!is_clear(middle + Cell(x, y, z), centre, radius)) return false;
-  uint32_t& head = bucket(middle);
+  insert(centre, radius);
+  return true;
+}
+
+void Spacing::insert(const Vec3& centre, Real radius) {
+  uint32_t& head = bucket(cell_at(centre));
   balls_.push_back({centre, radius, head});
   head = static_cast<uint32_t>(balls_.size() - 1);
-  return true;
 }
 
 }  // namespace offstage::effects

@@ -14,6 +14,8 @@ class Spacing {
   void reset(uint64_t count, Real diameter);
   /// Adds the ball unless it overlaps a ball in the table; returns whether it was added.
   bool add(const Vec3& centre, Real radius);
+  /// Adds the ball, even if it overlaps others.
+  void insert(const Vec3& centre, Real radius);
 
  private:
   struct Ball {
@@ -22,6 +24,7 @@ class Spacing {
     uint32_t next;  // next ball in its bucket
   };
 
+  Eigen::Matrix<int64_t, 3, 1> cell_at(const Vec3& point) const;
   uint32_t& bucket(const Eigen::Matrix<int64_t, 3, 1>& cell);
   bool is_clear(const Eigen::Matrix<int64_t, 3, 1>& cell, const Vec3& centre, Real radius);
 
