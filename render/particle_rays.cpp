@@ -8,6 +8,7 @@ namespace offstage::render {
 namespace {
 
 constexpr float kLeastRadius_px = 1;  // half the width of a cell of mirror images
+constexpr float kDot = 1e-3f;         // length of the line of a dot, as a fraction of its diameter
 
 /// Returns the radius with which a particle is drawn. The eye is at least as far from a mirror image as from
 /// the particle.
@@ -69,9 +70,12 @@ RayParticleSet lines_of(const PointSet& set, const View& view, float pixel_m) {
   for (const GpuPoint& point : set.points) {
     const float drawn = drawn_radius(point, view, pixel_m);
     const Vector3f half_axis = 0.5f * set.def.stretch_s * point.velocity.head<3>();
+    const float half_length = half_axis.norm();
     Vector4f along = Vector4f::Zero(), place = point.position, color = point.color;
-    // A streak at rest is a dot.
-    along.head<3>() = half_axis.norm() > drawn ? half_axis : Vector3f(0, drawn, 0);
+    // The length of a streak includes its rounded ends. A streak at rest is a dot; rays meet no line without
+    // a length.
+    along.head<3>() = half_length > (1 + kDot) * drawn ? Vector3f((1 - drawn / half_length) * half_axis)
+                                                       : Vector3f(0, kDot * drawn, 0);
     place.w() = drawn;
     color.w() = std::min(color.w(), 1.0f) * (point.position.w() / drawn);
     result.places.push_back(place + along);

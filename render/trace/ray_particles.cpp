@@ -33,13 +33,16 @@ float opacity_on_ray(const RayParticleSet& set, std::size_t i, const Vector3f& f
     const float shape = set.scattering == Scattering::flake ? kFlake : 1.0f;
     return coverage(across(disc.head<3>() - from, direction).norm() / (shape * disc.w()), set.softness);
   }
-  // t: the point of the axis that is nearest to the ray, from the head (0) to the tail (1).
+  // As in splatter.cpp, with the half axis from the middle to the tail.
   const Vector4f &head = set.places[2 * i], &tail = set.places[2 * i + 1];
-  const Vector3f axis = across((tail - head).head<3>(), direction),
-                 to_head = across(head.head<3>() - from, direction);
-  const float length2 = axis.squaredNorm();
-  const float t = length2 > 0 ? std::clamp(-to_head.dot(axis) / length2, 0.0f, 1.0f) : 0.5f;
-  return coverage((to_head + t * axis).norm() / head.w(), set.softness) * (1 - set.taper * t);
+  const float radius = head.w();
+  const Vector3f axis = across(0.5f * (tail - head).head<3>(), direction),
+                 from_middle = across(from - 0.5f * (head + tail).head<3>(), direction);
+  const float half_length = axis.norm();
+  const Vector3f unit = half_length > 0 ? Vector3f(axis / half_length) : Vector3f(Vector3f::Zero());
+  const float along = from_middle.dot(unit), nearest = std::clamp(along, -half_length, half_length);
+  const float to_tail = 0.5f + 0.5f * std::clamp(along / (half_length + radius), -1.0f, 1.0f);
+  return coverage((from_middle - nearest * unit).norm() / radius, set.softness) * (1 - set.taper * to_tail);
 }
 
 /// Returns the normal of a particle's surface on a ray; zero for drops. That of sprites is interpolated from

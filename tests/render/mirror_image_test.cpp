@@ -414,6 +414,31 @@ TEST(MirrorImage, ShowsTheLightOfParticles) {
     }
 }
 
+// The length of a streak is that of its motion, with its rounded ends; a slow one is a dot.
+TEST(MirrorImage, ShowsStreaksWithTheirLength) {
+  MirrorScene dark = daylight();
+  dark.sky.intensity = 0;
+  for (const float taper : {0.0f, 1.0f})
+    for (const float length : {0.0f, 0.3f, 0.7f, 1.0f, 1.6f}) {
+      const Fill fill = [&](SmallStage& s) {
+        Point streak{.position = {0, 0, 3},
+                     .velocity = {0.6f * length, 0.8f * length, 0},
+                     .radius = 0.2f,
+                     .color = {1, 1, 1, 1},
+                     .id = 1};
+        s.stage.set_points(s.stage.add_points({.style = PointStyle::streak,
+                                               .lit = false,
+                                               .softness = 0.2f,
+                                               .stretch_s = 1,
+                                               .taper = taper}),
+                           std::array{streak});
+      };
+      const float direct = light_of_middle(dark.draw(fill, false)).x();
+      EXPECT_NEAR(light_of_middle(dark.draw(fill, true)).x() / direct, 1, 0.04f)
+          << "length " << length << ", taper " << taper;
+    }
+}
+
 // A wet surface mirrors the scene, and so does its mirror image. Its ripples move.
 TEST(MirrorImage, ShowsWater) {
   for (const float turn_deg : {0.0f, 50.0f}) {
