@@ -288,9 +288,11 @@ Vector3f VisibleLight::lamps(int pixel, const Vector3f& traced, const Vector3f& 
 
 // Refracts or reflects a path at a glass surface, and adds the light that the surface scatters. Returns false
 // if the surface is not glass. To reduce noise, a reflection of less than a tenth is not followed: outside of
-// the glass it shows the sky, and inside its light is added to the refracted light.
-bool LightTracer::follow_glass(const Hit& hit, const RaySurface& surface, PixelSampler& sampler, Path& path,
-                               FoundLight& found) const {
+// the glass it shows the sky, and inside its light is added to the refracted light. For the same reason, both
+// paths are followed at the first surfaces behind the visible one: the rim of a ball was dotted, because it
+// reflects between a tenth and all of the light inside.
+bool LightTracer::follow_glass(const Hit& hit, const RaySurface& surface, PixelSampler& sampler,
+                               const VisibleLight* visible, Path& path, FoundLight& found) const {
   if (surface.transmission <= 0) return false;
   const Vector3f albedo = surface.color.head<3>();
   if (hit.front && surface.transmission < 1) {
@@ -301,13 +303,21 @@ bool LightTracer::follow_glass(const Hit& hit, const RaySurface& surface, PixelS
   }
   const float mirrored = mirrored_fraction(hit, path.direction);
   const Vector3f mirrored_direction = reflected(path.direction, hit.normal);
-  if (mirrored >= 0.1f && sampler.next().x < mirrored) {
+  const bool forks = mirrored >= 0.1f && mirrored < 1 && path.forks > 0;
+  if (forks) {
+    --path.forks;
+    Path branch = path;
+    branch.fraction *= mirrored;
+    branch.turn(mirrored_direction, hit);
+    found.add(radiance(branch, sampler, visible));
+    path.fraction *= 1 - mirrored;
+  } else if (mirrored >= 0.1f && sampler.next().x < mirrored) {
     path.turn(mirrored_direction, hit);
     path.by_chance |= mirrored < 0.5f;  // the more likely choice causes no bright dots
     return true;
   }
   const bool came_by_chance = path.by_chance;
-  path.by_chance |= mirrored >= 0.5f || is_rough_glass(surface.roughness);
+  path.by_chance |= (mirrored >= 0.5f && !forks) || is_rough_glass(surface.roughness);
   if (mirrored < 0.1f && hit.front) {
     (came_by_chance ? found.noisy : found.certain) +=
         mirrored * path.fraction.cwiseProduct(sky_radiance(sources_.sky, mirrored_direction));
@@ -454,9 +464,7 @@ void LightTracer::add_varnish(const Hit& hit, const RaySurface& surface, const V
   const Vector3f facet =
       a < kSharp ? hit.normal : visible_facet(hit.normal, -path.direction, a, sampler.next());
   branch.turn(reflected(path.direction, facet), hit);
-  const FoundLight found = radiance(branch, sampler, visible);
-  light.noisy += found.noisy;
-  light.certain += found.certain;
+  light.add(radiance(branch, sampler, visible));
 }
 
 // Returns the radiance that arrives along a path. `met`, if not null, is set to the distance of the first hit
@@ -526,7 +534,7 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
     if (sharp && is_shaded)
       (path.by_chance ? light.noisy : light.certain) +=
           path.fraction.cwiseProduct(highlights(hit, surface.roughness, reflectance_at_right_angle(surface)));
-    if (follow_glass(hit, surface, sampler, path, light)) continue;
+    if (follow_glass(hit, surface, sampler, visible, path, light)) continue;
     path.from = off_surface(hit.position, hit.face);
     if (follow_smooth(hit, surface, sampler, sharp, visible, path, light)) continue;
     Response response = sharp ? Response::seen(hit, surface, path.direction, sources_.sky.sun_direction)
@@ -593,9 +601,7 @@ void LightTracer::split(const Hit& hit, const Path& path, PixelSampler& sampler,
     part.cone = 0.5f;
     part.fraction /= static_cast<float>(path.splits);
     part.scatter(hit.normal, outgoing.dot(hit.face) > 0 ? outgoing : reflected(outgoing, hit.face));
-    const FoundLight found = radiance(part, sampler);
-    light.noisy += found.noisy;
-    light.certain += found.certain;
+    light.add(radiance(part, sampler));
   }
 }
 

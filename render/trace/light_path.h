@@ -77,6 +77,8 @@ struct LightTracer::Path {
   int bounces = 0;        ///< number of diffuse surfaces that radiance() has followed the path from
   bool branched = false;  ///< whether the path is the mirror image of a varnished surface in a picture
   int splits = 1;         ///< number of paths that leave the first diffuse surface
+  int forks =
+      0;  ///< number of glass surfaces at which both the reflected and the refracted path are followed
   MetParticles particles = MetParticles::none;  ///< particles that are visible along the path
   bool from_background =
       false;  ///< whether the path shows a transparent background if it leaves the scene unmirrored

@@ -146,12 +146,17 @@ class LightTracer {
     float background = 0;  ///< fraction of a transparent background that is visible along the path
     /// Returns the sum of both parts, the noisy one limited to a maximum brightness. Adds to `sums`.
     Vector3f limited(LightSums& sums) const;
+    /// Adds the light of another path to the same point.
+    void add(const FoundLight& more) {
+      noisy += more.noisy;
+      certain += more.certain;
+    }
   };
   FoundLight radiance(Path path, PixelSampler& sampler, const VisibleLight* visible = nullptr,
                       float* met = nullptr) const;
   void split(const Hit& hit, const Path& path, PixelSampler& sampler, FoundLight& light) const;
-  bool follow_glass(const Hit& hit, const RaySurface& surface, PixelSampler& sampler, Path& path,
-                    FoundLight& found) const;
+  bool follow_glass(const Hit& hit, const RaySurface& surface, PixelSampler& sampler,
+                    const VisibleLight* visible, Path& path, FoundLight& found) const;
   bool follow_smooth(const Hit& hit, const RaySurface& surface, PixelSampler& sampler, bool sharp,
                      const VisibleLight* visible, Path& path, FoundLight& light) const;
   void add_varnish(const Hit& hit, const RaySurface& surface, const Vector3f& mirrored, PixelSampler& sampler,

@@ -8,9 +8,10 @@
 namespace offstage::render {
 namespace {
 
-// Number of paths that leave the diffuse surfaces in a mirror image that is not filtered. Frames of many
-// sub-frames need few.
+// Number of paths that leave the diffuse surfaces in a mirror image that is not filtered, or behind glass.
+// Frames of many sub-frames need few.
 constexpr int kMirrorSplits = 8, kMirrorSplitsOfMany = 2;
+constexpr int kGlassForks = 2;  // see Path::forks
 constexpr int kMirrorRays = 2;  // number of rays in a mirror image that is neither sharp nor filtered
 
 /// Returns the particles that are visible in mirror images by a surface.
@@ -126,7 +127,9 @@ LightTracer::FoundLight LightTracer::light_through(const Point& point, const Lig
             .direction = -point.view,
             .cone = view.pixel_m,
             .width = view.pixel_m * distance,
-            .is_picture = true};
+            .is_picture = true,
+            .splits = view.offsets.are_many() ? kMirrorSplitsOfMany : kMirrorSplits,
+            .forks = kGlassForks};
   path.from_background = from_background;
   Hit hit;
   if (!scene_.first_seen(path.from, path.direction, kFar, hit)) return radiance(path, sampler, &visible);
