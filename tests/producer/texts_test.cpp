@@ -73,6 +73,13 @@ TEST(Texts, LinesAreOneBelowTheOtherAndGrowWithTheirSize) {
   EXPECT_NEAR(height({.text = "HH", .size = 0.1}), 2 * one, 2);
 }
 
+TEST(Texts, ALongLineIsSmallerSoThatItFits) {
+  const auto box = text_box(shown({.text = std::string(24, 'H'), .size = 0.2}));
+  EXPECT_GT(box[0], 0);
+  EXPECT_LT(box[2], kWidth);
+  EXPECT_GT(box[2] - box[0], kWidth / 2);
+}
+
 TEST(Texts, AreVisibleOnlyInTheirTime) {
   const TextOverlay overlay{.text = "now", .from = 1, .until = 2};
   EXPECT_EQ(shown(overlay, 0.99).rgba, grey().rgba);

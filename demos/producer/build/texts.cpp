@@ -12,6 +12,8 @@
 namespace offstage::producer {
 namespace {
 
+constexpr int kLine_px = render::kTextHeight_px + 3;  // height of a line with its gap, at scale 1
+
 void replace_all(std::string& text, const std::string& what, const std::string& by) {
   for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + by.size()))
     text.replace(at, what.size(), by);
@@ -40,11 +42,20 @@ std::array<uint8_t, 3> bytes_of(const Color& color) {
   return rgb;
 }
 
+/// Returns the size of a pixel of the font in the picture. It is a whole number, and so small that the
+/// longest line fits into the picture, if possible.
+int scale_of(const TextOverlay& overlay, const std::vector<std::string>& lines, const render::Image& image) {
+  int longest = 0;
+  for (const std::string& line : lines) longest = std::max(longest, render::text_width_px(line));
+  const int margins = 4 * kLine_px / 3;
+  const auto wanted = static_cast<int>(std::lround(overlay.size * image.height_px / render::kTextHeight_px));
+  return std::max(1, std::min(wanted, image.width_px / (longest + margins)));
+}
+
 void write_text(const TextOverlay& overlay, const Snapshot& moment, render::Image& image) {
   const std::vector<std::string> lines = lines_of(overlay, moment);
-  const int scale =
-      std::max(1, static_cast<int>(std::lround(overlay.size * image.height_px / render::kTextHeight_px)));
-  const int line_px = scale * (render::kTextHeight_px + 3), margin = 2 * line_px / 3;
+  const int scale = scale_of(overlay, lines, image);
+  const int line_px = scale * kLine_px, margin = 2 * line_px / 3;
   const int height = static_cast<int>(lines.size()) * line_px;
   const bool bottom = overlay.place == TextPlace::bottom_left || overlay.place == TextPlace::bottom_right;
   const bool right = overlay.place == TextPlace::top_right || overlay.place == TextPlace::bottom_right;

@@ -173,14 +173,18 @@ struct Table<TextOverlay> {
   static constexpr const char* kHelp = "Text over the picture.";
   static Fields<TextOverlay> fields() {
     using T = TextOverlay;
-    return {{"text", &T::text,
-             "ASCII text; {time}, {frame}, {bodies} and {particles} are replaced by their values, a line "
-             "break starts a new line"},
-            {"place", &T::place, "corner of the picture in which the text stands, or its centre"},
-            {"size", &T::size, "height of a line, as a fraction of the picture's height", "", over(0, 0.5)},
-            {"color", &T::color, "colour of the letters"},
-            {"from", &T::from, "time at which the text appears", "s"},
-            {"until", &T::until, "time at which the text disappears; default: it stays", "s"}};
+    return {
+        {"text", &T::text,
+         "ASCII text; {time}, {frame}, {bodies} and {particles} are replaced by their values, a line "
+         "break starts a new line"},
+        {"place", &T::place, "corner of the picture in which the text stands, or its centre"},
+        {"size", &T::size,
+         "height of a line, as a fraction of the picture's height; less where a line would be wider than the "
+         "picture",
+         "", over(0, 0.5)},
+        {"color", &T::color, "colour of the letters"},
+        {"from", &T::from, "time at which the text appears", "s"},
+        {"until", &T::until, "time at which the text disappears; default: it stays", "s"}};
   }
 };
 template <>
