@@ -13,8 +13,8 @@ namespace {
 /// A release that was interrupted because there was no room continues after at most this time, even if its
 /// particles are slow [s].
 constexpr Real kMaxClearing = 1;
-/// Number of random places on a mesh that are tried for one particle. If half of the surface is occupied,
-/// most random places are not free.
+/// Number of random places that are tried for one particle. If half of the surface is occupied, most random
+/// places are not free.
 constexpr uint32_t kTries = 64;
 /// Where new particles keep their distance from living ones, room is sought again after the time in which a
 /// particle moves by this fraction of its diameter, but at most this number of times in a sub-step.
@@ -214,11 +214,14 @@ void Emitter::postpone(const Release& rest, Real end) {
 uint64_t Emitter::place(sim::World& world, const Batch& batch) {
   if (def_.release.overlap) return place_anywhere(world, batch);
   const bool in_cells = surface_.has_cells() && (batch.together || !meets_particles_);
+  // More particles may wait than there is room for.
+  const Real room = 1 + 4 * surface_.area() / (batch.diameter * batch.diameter);
+  const uint64_t expected = std::min(batch.count, static_cast<uint64_t>(std::min(room, 1e12)));
   if (meets_particles_)
-    neighbours_.place_into(spacing_, batch.count, batch.diameter, batch.birth_time, batch.carrier.pose,
+    neighbours_.place_into(spacing_, expected, batch.diameter, batch.birth_time, batch.carrier.pose,
                            def_.surface.pose);
   else if (!in_cells)
-    spacing_.reset(batch.count, batch.diameter);
+    spacing_.reset(expected, batch.diameter);
   return in_cells ? place_in_cells(world, batch) : place_apart(world, batch);
 }
 

@@ -21,7 +21,8 @@ class Neighbours {
   void add(const sim::Particle& particle, Real birth_time);
 
   /// Fills a table with the neighbours as they are at a time of the sub-step [s]. The table has room for
-  /// `count` more balls of at most `diameter` [m], and is in the frame `surface`, which moves with `carrier`.
+  /// about `count` more balls of at most `diameter` [m], and is in the frame `surface`, which moves with
+  /// `carrier`.
   void place_into(Spacing& spacing, uint64_t count, Real diameter, Real time, const sim::Pose& carrier,
                   const sim::Pose& surface) const;
 

@@ -10,7 +10,7 @@ namespace offstage::effects {
 
 class Spacing {
  public:
-  /// Clears the table, for up to `count` balls of at most `diameter` [m].
+  /// Clears the table, for about `count` balls (with more, it is slower) of at most `diameter` [m].
   void reset(uint64_t count, Real diameter);
   /// Adds the ball unless it overlaps a ball in the table; returns whether it was added.
   bool add(const Vec3& centre, Real radius);
