@@ -74,7 +74,7 @@ TEST(Texts, LinesAreOneBelowTheOtherAndGrowWithTheirSize) {
 }
 
 TEST(Texts, ALongLineIsSmallerSoThatItFits) {
-  const auto box = text_box(shown({.text = std::string(24, 'H'), .size = 0.2}));
+  const auto box = text_box(shown({.text = std::string(20, 'H'), .size = 0.2}));
   EXPECT_GT(box[0], 0);
   EXPECT_LT(box[2], kWidth);
   EXPECT_GT(box[2] - box[0], kWidth / 2);
