@@ -103,7 +103,8 @@ TEST(EmitterRoom, ExternalParticlesOfTwoEmittersAtOnePlaceDoNotOverlap) {
   EXPECT_GT(smallest_gap(world.particles(first), world.particles(second)), -1.0 / 240);
 }
 
-// 80 balls of 4 cm roll apart after they fell through a hole of 5 cm. From one point, they would build a tower of 3 m.
+// 80 balls of 4 cm roll apart after they fell through a hole of 5 cm. From one point, they would build a
+// tower of 3 m.
 TEST(EmitterRoom, BallsPouredFromANarrowHoleBuildNoTower) {
   World world;
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
