@@ -18,7 +18,11 @@ constexpr Real kMaxClearing = 1;
 constexpr uint32_t kTries = 64;
 /// Where new particles keep their distance from living ones, room is sought again after the time in which a
 /// particle moves by this fraction of its diameter, but at most this number of times in a sub-step.
-constexpr Real kClearedPart = 0.25, kMaxRetries = 16;
+constexpr Real kClearedPart = 0.25;
+constexpr uint64_t kMaxRetries = 16;
+/// Greatest number of waiting particles for which room is sought at once. An emitter with a high rate may
+/// have millions, for which there is no room.
+constexpr uint64_t kMostRetried = 10'000;
 
 std::string owner(const EmitterDef& def) {
   return "emitter \"" + def.name + "\"";
@@ -150,7 +154,7 @@ void Emitter::find_neighbours(const sim::World& world, Real start, Real end) {
     return def_.body ? world.body_motion(def_.body, time).pose.point_to_world(own) : own;
   };
   uint64_t count = 0;
-  for (const Release& r : due_) count += r.count;
+  for (const Release& r : due_) count += r.waited ? std::min(r.count, kMaxRetries * kMostRetried) : r.count;
   const Vec3 first = centre(start), last = centre(end);
   const Real reach = surface_.reach() + largest_diameter(count, start) + (last - first).norm() / 2;
   neighbours_.collect(world, target_, (first + last) / 2, reach, start, end);
@@ -167,11 +171,12 @@ void Emitter::release(sim::World& world, const Release& r, Real start, Real end)
   if (allowed > 0) {
     // Without waiting, particles that were due earlier belong to the prewarm.
     const Real birth_time = r.waited ? std::max(r.time, start) : r.time;
-    const Batch batch{allowed,
+    const uint64_t tried = meets_particles_ && r.waited ? std::min(allowed, kMostRetried) : allowed;
+    const Batch batch{tried,
                       r.together,
                       birth_time,
                       end,
-                      largest_diameter(allowed, birth_time),
+                      largest_diameter(tried, birth_time),
                       def_.body ? world.body_motion(def_.body, std::max(birth_time, start)) : sim::Motion{}};
     const uint64_t placed = place(world, batch);
     report_.released += placed;
@@ -190,7 +195,8 @@ void Emitter::wait(const Batch& batch, uint64_t rest, bool waited, Real start) {
   if (!waited) report_.waited += rest;
   Real next = batch.birth_time + clearing;
   if (meets_particles_) {
-    const Real pause = std::max(kClearedPart * clearing, (batch.end - start) / kMaxRetries);
+    const Real pause =
+        std::max(kClearedPart * clearing, (batch.end - start) / static_cast<Real>(kMaxRetries));
     next = retry_ = std::min(batch.birth_time + pause, batch.end);
   }
   postpone({next, rest, batch.together, true}, batch.end);

@@ -77,8 +77,9 @@ struct LightTracer::Path {
   int bounces = 0;        ///< number of diffuse surfaces that radiance() has followed the path from
   bool branched = false;  ///< whether the path is the mirror image of a varnished surface in a picture
   int splits = 1;         ///< number of paths that leave the first diffuse surface
-  int forks =
-      0;  ///< number of glass surfaces at which both the reflected and the refracted path are followed
+  /// Number of glass surfaces, before the first diffuse surface, at which both the reflected and the
+  /// refracted path are followed.
+  int forks = 0;
   MetParticles particles = MetParticles::none;  ///< particles that are visible along the path
   bool from_background =
       false;  ///< whether the path shows a transparent background if it leaves the scene unmirrored
@@ -100,6 +101,7 @@ struct LightTracer::Path {
     glow_is_sampled = true;
     particles = MetParticles::none;
     is_picture = false;
+    forks = 0;
     direction = outgoing;
     by_chance = true;
     density = -1;

@@ -281,8 +281,7 @@ struct Table<Emitter> {
         {"overlap", &T::overlap,
          "whether new particles may overlap, so that they never wait for space; only for particles that do "
          "not collide with each other. With `false`, particles that are released together do not overlap, "
-         "and "
-         "those of an `internal` or `external` emitter wait until living ones have left"},
+         "and those of an `internal` or `external` emitter wait until living ones have left"},
         {"rate", &T::rate, "number of particles released one by one per second", "1/s", between(0, 1e9)},
         {"rate_per_metre", &T::rate_per_metre,
          "number of particles released evenly along each metre of the path of the body, in addition to "
