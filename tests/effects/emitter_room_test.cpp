@@ -103,21 +103,28 @@ TEST(EmitterRoom, ExternalParticlesOfTwoEmittersAtOnePlaceDoNotOverlap) {
   EXPECT_GT(smallest_gap(world.particles(first), world.particles(second)), -1.0 / 240);
 }
 
-// 80 balls of 4 cm roll apart after they fell through a hole of 5 cm. From one point, they would build a
-// tower of 3 m.
-TEST(EmitterRoom, BallsPouredFromANarrowHoleBuildNoTower) {
-  World world;
-  world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
-  const auto system = world.add_particle_system({.internal = true, .rotates = true});
-  Emitter emitter({.surface = {.pose = {.position = {0, 1.5, 0}}, .size = {0.05, 0.05}},
-                   .release = {.direction = -Vec3::UnitY(), .rate = 20.0, .end = 4},
-                   .particles = {.speed = 1.0, .radius = 0.02, .lifespan = 1e9, .restitution = 0.1}},
-                  system);
-  for (int i = 0; i < 50; ++i)
-    world.step(0.1, [&](Real start, Real end) { emitter.emit(world, start, end); });
-  const ParticleArrays& p = world.particles(system);
-  EXPECT_EQ(p.size(), 80u);
-  for (const Vec3& x : p.position) EXPECT_LT(x.y(), 0.2);
+// Balls of 4 cm are poured through holes for one, four and nine of them. From the middles of cells they would
+// stand exactly above each other: without friction four towers of 0.77 m, with friction one up to the hole.
+TEST(EmitterRoom, PouredBallsBuildNoTowers) {
+  for (const Real width : {0.05, 0.09, 0.13})
+    for (const Real friction : {0.0, 0.2, 0.5}) {
+      SCOPED_TRACE(testing::Message() << "hole of " << width << " m, friction " << friction);
+      World world;
+      world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
+      // Balls that cannot roll stand on each other up to their friction angle.
+      const auto system = world.add_particle_system({.internal = true, .rotates = friction > 0.3});
+      Emitter emitter(
+          {.surface = {.pose = {.position = {0, 1.5, 0}}, .size = {width, width}},
+           .release = {.direction = -Vec3::UnitY(), .rate = 20.0, .end = 4},
+           .particles =
+               {.speed = 1.0, .radius = 0.02, .lifespan = 1e9, .restitution = 0.1, .friction = friction}},
+          system);
+      for (int i = 0; i < 50; ++i)
+        world.step(0.1, [&](Real start, Real end) { emitter.emit(world, start, end); });
+      const ParticleArrays& p = world.particles(system);
+      EXPECT_EQ(p.size(), 80u);
+      for (const Vec3& x : p.position) EXPECT_LT(x.y(), 0.1);
+    }
 }
 
 }  // namespace
