@@ -21,7 +21,7 @@ gl::LazyProgram make_surface_program(std::vector<std::string> defines) {
   defines.insert(defines.end(), {"FLAT 1", "WEAVE 0", "SURFACE 1"});
   return {{"frame.glsl", "cloth.vert"},
           {"frame.glsl", "sky.glsl", "light.glsl", "material.glsl", "noise.glsl", "surface.glsl",
-           "sheer.glsl", "threads.glsl", "fabric.glsl", "cloth.frag"},
+           "threads.glsl", "fabric.glsl", "cloth.frag"},
           std::move(defines)};
 }
 
@@ -30,8 +30,8 @@ gl::LazyProgram make_surface_program(std::vector<std::string> defines) {
 ClothPass::ClothPass()
     : depth_({"frame.glsl", "cloth.vert"}, {}, {}),
       surface_(make_surface_program({})),
-      sheer_surface_(make_surface_program({"SHEER 1"})),
-      textured_sheer_surface_(make_surface_program({"SHEER 1", "TEXTURED 1"})) {}
+      layer_(make_surface_program({"SHEER 1", "LAYER 1"})),
+      textured_layer_(make_surface_program({"SHEER 1", "LAYER 1", "TEXTURED 1"})) {}
 
 void ClothPass::prepare(Cloth& cloth) {
   if (cloth.vertex_array == 0) cloth.vertex_array = make_layout();
@@ -59,8 +59,16 @@ void ClothPass::bind(const Cloth& cloth) {
 }
 
 void ClothPass::draw_depth(const Cloth& cloth) {
-  depth_.use();
+  glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+  glDisable(GL_CULL_FACE);
+  if (cloth.is_translucent() && cloth.material->textures[0] != 0) {
+    program(*cloth.material, {}).use();  // its texture can have holes
+    bind(cloth);
+  } else {
+    depth_.use();
+  }
   draw_triangles(cloth);
+  glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
 }
 
 gl::LazyProgram& ClothPass::program(const GpuMaterial& material, const Features& features) {
@@ -79,10 +87,7 @@ gl::LazyProgram& ClothPass::program(const GpuMaterial& material, const Features&
     defines.push_back("PATTERN " + std::to_string(static_cast<int>(material.pattern)));
     fragment.push_back("pattern.glsl");
   }
-  if (translucent) {
-    defines.push_back("SHEER 1");
-    fragment.push_back("sheer.glsl");
-  }
+  if (translucent) defines.push_back("SHEER 1");
   fragment.insert(fragment.end(), {"threads.glsl", "fabric.glsl", "cloth.frag"});
   const std::vector<std::string_view> vertex = {"frame.glsl", "cloth.vert"};
   return programs_.emplace(key, gl::LazyProgram(vertex, fragment, defines)).first->second;
@@ -100,7 +105,7 @@ void ClothPass::draw_surface(const Cloth& cloth) {
   if (!cloth.is_translucent())
     surface_.use();
   else
-    (cloth.material->textures[0] != 0 ? textured_sheer_surface_ : sheer_surface_).use();
+    (cloth.material->textures[0] != 0 ? textured_layer_ : layer_).use();
   glDisable(GL_CULL_FACE);
   glFrontFace(GL_CCW);
   bind(cloth);

@@ -37,10 +37,11 @@ class ClothPass {
   ClothPass();
   /// Uploads the current state of a cloth.
   void prepare(Cloth& cloth);
-  /// Draws the depth of an opaque cloth into the picture. The depth is exactly that of draw().
+  /// Draws only the depth of a cloth, which is exactly that of draw().
   void draw_depth(const Cloth& cloth);
   void draw(const Cloth& cloth, const Features& features);
-  /// Draws the surface of a cloth into the targets from which its light is traced.
+  /// Draws the surface of a cloth into the targets from which its light is traced. Of a translucent cloth,
+  /// only what is in front of the bound depth is drawn; see LightPass::begin_layer.
   void draw_surface(const Cloth& cloth);
 
  private:
@@ -50,7 +51,7 @@ class ClothPass {
 
   std::map<std::tuple<Weave, Pattern, bool, bool, Features>, gl::LazyProgram>
       programs_;  ///< key: textured, translucent, features
-  gl::LazyProgram depth_, surface_, sheer_surface_, textured_sheer_surface_;
+  gl::LazyProgram depth_, surface_, layer_, textured_layer_;
 };
 
 }  // namespace offstage::render

@@ -145,9 +145,7 @@ FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& en
   frame.ray_x = vec4(x);
   frame.ray_y = vec4(y);
   frame.depth = {n * f / (f - n), n / (f - n), n, f};
-  // The dither values of a pixel in all sub-frames are evenly distributed over [0, 1).
-  frame.sun_direction = vec4(jittered_sun(sun, offsets.light),
-                             static_cast<float>(offsets.index) / static_cast<float>(offsets.count));
+  frame.sun_direction = vec4(jittered_sun(sun, offsets.light));
   frame.sun_radiance = vec4(sun.color * sun.intensity, 0.5f * sun.size_deg * kRadians);
   frame.zenith = vec4(sky.zenith, environment.fog);
   frame.horizon = vec4(sky.horizon);
@@ -159,7 +157,7 @@ FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& en
   // The disc of the half vectors to the part of the sun's disc that a sub-frame represents: radius^2.
   const float radius = 0.5f * frame.sun_radiance.w();
   frame.irradiance[6].w() = radius * radius / static_cast<float>(offsets.count);
-  frame.air = {time, environment.clouds, static_cast<float>(offsets.count), 0};
+  frame.air = {time, environment.clouds, 0, 0};
   return frame;
 }
 

@@ -1,5 +1,6 @@
 #include "render/light_pass.h"
 
+#include <algorithm>
 #include <array>
 
 #include "render/frame.h"
@@ -13,6 +14,8 @@ constexpr GLuint kArrivingUnit = 8, kSunUnit = 9, kLampsUnit = 10, kMirroredUnit
 constexpr GLuint kThroughGlassUnit = 20, kMirroredByGlassUnit = 21;
 // Texture units of shaders/plain.frag.
 constexpr GLuint kPlacesUnit = 25, kNormalsUnit = 26, kColorsUnit = 27;
+// Texture unit of shaders/surface.glsl.
+constexpr GLuint kDepthBehindUnit = 28;
 
 void write_texture(const gl::Texture& texture, GLuint unit, const Eigen::AlignedBox2i& area_px,
                    const std::vector<Vector4f>& values) {
@@ -26,6 +29,14 @@ void clear_surfaces(GLuint framebuffer) {
   const std::array<float, 4> nothing = {0, 0, 0, -1}, flat = {0.5f, 0.5f, 0.5f, 0.5f};
   glClearNamedFramebufferfv(framebuffer, GL_COLOR, 0, nothing.data());
   glClearNamedFramebufferfv(framebuffer, GL_COLOR, 1, flat.data());
+}
+
+/// Moves the first corner of a part of the picture to a multiple of kGrid_px. The samples of a pixel depend on
+/// its place in the part. They complement those of the other sub-frames only if the part begins at the same
+/// pixel, although its objects move a little.
+Eigen::AlignedBox2i on_grid(const Eigen::AlignedBox2i& part_px) {
+  constexpr int kGrid_px = 16;
+  return {Eigen::Vector2i(part_px.min().array() / kGrid_px * kGrid_px), part_px.max()};
 }
 
 /// Makes all targets of surfaces writable. `colors`: texture for the colours of surfaces; 0 if they are not
@@ -127,23 +138,68 @@ void LightPass::trace(const LightSources& sources, const View& view, const Sampl
   write_light(all_px_, light_);
 }
 
-bool LightPass::begin_part(GLuint depth, const Eigen::AlignedBox2i& area_px) {
-  part_px_ = area_px.intersection(all_px_);
-  if (part_px_.isEmpty() || part_px_.volume() == 0) return false;
-  const int width = all_px_.sizes().x(), height = all_px_.sizes().y();
+// Binds and clears the targets for drawing surfaces in a part of the picture, except their depth. Returns
+// false if the area is outside of the picture.
+bool LightPass::begin_part(const Eigen::AlignedBox2i& area_px) {
+  const Eigen::AlignedBox2i area = area_px.intersection(all_px_);
+  if (area.isEmpty() || area.volume() == 0) return false;
+  part_px_ = on_grid(area);
+  const Eigen::Vector2i all = all_px_.sizes(), first = part_px_.min(), size = part_px_.sizes();
   if (part_framebuffer_ == 0) {
-    part_depth_ = gl::make_target(GL_DEPTH_COMPONENT32F, width, height, GL_NEAREST);
-    part_framebuffer_ = gl::make_framebuffer(places_, part_depth_);
+    for (gl::Texture& depth : part_depths_)
+      depth = gl::make_target(GL_DEPTH_COMPONENT32F, all.x(), all.y(), GL_NEAREST);
+    part_framebuffer_ = gl::make_framebuffer(places_, part_depths_[part_]);
     write_to_all(part_framebuffer_, normals_, 0);
   }
-  const int x = part_px_.min().x(), y = part_px_.min().y(), w = part_px_.sizes().x(),
-            h = part_px_.sizes().y();
-  glCopyImageSubData(depth, GL_TEXTURE_2D, 0, x, y, 0, part_depth_, GL_TEXTURE_2D, 0, x, y, 0, w, h, 1);
+  part_ = 1 - part_;
+  glNamedFramebufferTexture(part_framebuffer_, GL_DEPTH_ATTACHMENT, part_depths_[part_], 0);
   glBindFramebuffer(GL_FRAMEBUFFER, part_framebuffer_);
-  glViewport(0, 0, width, height);
+  glViewport(0, 0, all.x(), all.y());
   glEnable(GL_SCISSOR_TEST);
-  glScissor(x, y, w, h);
+  glScissor(first.x(), first.y(), size.x(), size.y());
   clear_surfaces(part_framebuffer_);
+  glDisable(GL_BLEND);
+  glDepthMask(GL_TRUE);
+  return true;
+}
+
+bool LightPass::begin_part(GLuint depth, const Eigen::AlignedBox2i& area_px) {
+  if (!begin_part(area_px)) return false;
+  const Eigen::Vector2i first = part_px_.min(), size = part_px_.sizes();
+  glCopyImageSubData(depth, GL_TEXTURE_2D, 0, first.x(), first.y(), 0, part_depths_[part_], GL_TEXTURE_2D, 0,
+                     first.x(), first.y(), 0, size.x(), size.y(), 1);
+  glBindTextureUnit(kDepthBehindUnit, depth);
+  glDepthFunc(GL_GREATER);
+  return true;
+}
+
+bool LightPass::begin_layer(GLuint behind, const Eigen::AlignedBox2i& area_px) {
+  if (!begin_part(area_px)) return false;
+  const float nearest = 1;
+  glClearNamedFramebufferfv(part_framebuffer_, GL_DEPTH, 0, &nearest);
+  glBindTextureUnit(kDepthBehindUnit, behind);
+  glDepthFunc(GL_LESS);
+  return true;
+}
+
+// Reduces the part of the picture to the smallest rectangle that contains all its surfaces. Returns false if
+// there are none.
+bool LightPass::crop_to_surfaces() {
+  const int width = surfaces_.width_px;
+  Eigen::AlignedBox2i seen;
+  for (int y = 0; y < surfaces_.height_px; ++y) {
+    const std::span row = std::span(surfaces_.places)
+                              .subspan(static_cast<std::size_t>(y * width), static_cast<std::size_t>(width));
+    const auto is_surface = [](const Vector4f& place) { return place.w() >= 0; };
+    const auto first = std::ranges::find_if(row, is_surface);
+    if (first == row.end()) continue;
+    const auto past = std::find_if(row.rbegin(), row.rend(), is_surface).base();
+    seen.extend(Eigen::Vector2i(static_cast<int>(first - row.begin()), y));
+    seen.extend(Eigen::Vector2i(static_cast<int>(past - row.begin()), y + 1));
+  }
+  if (seen.isEmpty()) return false;
+  part_px_ = on_grid({part_px_.min() + seen.min(), part_px_.min() + seen.max()});
+  read_surfaces(part_px_, surfaces_);
   return true;
 }
 
@@ -170,9 +226,10 @@ void LightPass::trace_glass(const LightSources& sources, const View& view, const
   glass_light_.highlights.swap(light_.highlights);
 }
 
-void LightPass::trace_body(const LightSources& sources, const View& view, const SampleOffsets& offsets) {
+GLuint LightPass::trace_body(const LightSources& sources, const View& view, const SampleOffsets& offsets) {
   glDisable(GL_SCISSOR_TEST);
   read_surfaces(part_px_, surfaces_);
+  if (!crop_to_surfaces()) return 0;
   if (!body_light_ || body_light_->pixels.width_px != surfaces_.width_px ||
       body_light_->pixels.height_px != surfaces_.height_px)
     body_light_.emplace(surfaces_.width_px, surfaces_.height_px);
@@ -180,6 +237,7 @@ void LightPass::trace_body(const LightSources& sources, const View& view, const 
   LightTracer(scene_, sources).trace_body(surfaces_, seen, VisibleLight(light_, seen), *body_light_);
   sums_ += body_light_->sums;
   write_light(part_px_, *body_light_);
+  return part_depths_[part_];
 }
 
 }  // namespace offstage::render

@@ -258,7 +258,7 @@ gl::LazyProgram& MeshPass::surface_program(const Batch& batch, Shading shading) 
   const GpuMaterial& material = *batch.material;
   // A surface without mirror images is drawn without the relief of its pattern, which is faster. The light of
   // lamps, which is traced for these surfaces, gets the relief in traced.glsl.
-  const bool surface = shading == Shading::surface;
+  const bool surface = shading == Shading::surface || shading == Shading::layer;
   const Pattern pattern = surface && !material.smooth ? Pattern::none : material.pattern;
   const bool plain = surface && is_plain(batch);
   const auto key = std::make_tuple(pattern, material.textured, material.detailed, material.triplanar,
@@ -268,6 +268,7 @@ gl::LazyProgram& MeshPass::surface_program(const Batch& batch, Shading shading) 
   std::vector<std::string> defines = features_;
   defines.push_back("FLAT 1");
   if (surface) defines.push_back("SURFACE 1");
+  if (shading == Shading::layer) defines.push_back("LAYER 1");
   if (plain) defines.push_back("PLAIN 1");
   std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "light.glsl", "material.glsl",
                                             surface ? "surface.glsl" : "traced.glsl"};

@@ -106,6 +106,7 @@ class MeshPass {
   void prepare(std::span<const Instance* const> instances, const View& view, const Features& features);
   enum class Shading {
     surface,  ///< writes the surfaces from which light is traced
+    layer,    ///< does the same in front of the bound depth; see LightPass::begin_layer
     /// Shaded by the traced light; quick pictures draw only materials that are not plain in this way.
     traced,
     traced_with_particles,  ///< does what `traced` does, and glass also shows the particles behind it

@@ -209,8 +209,6 @@ void Stage::Impl::trace_glass(const View& view, const SampleOffsets& offsets) {
   Eigen::AlignedBox2i area_px = area.pixels(def.width_px, def.height_px);
   area_px = Eigen::AlignedBox2i(area_px.min().array() - 1, area_px.max().array() + 1);
   if (!light_pass.begin_part(picture.depth, area_px)) return;
-  glDepthMask(GL_TRUE);
-  glDepthFunc(GL_GREATER);
   for (std::size_t k = 0; k < mesh_pass.translucent().size(); ++k)
     if (mesh_pass.translucent()[k]->material->glass)
       mesh_pass.draw_translucent(k, MeshPass::Shading::surface);
@@ -329,28 +327,8 @@ void Stage::Impl::draw_run(const PaintOrder::Run& run, const View& view, const F
   picture.behind.change(area);
 }
 
-// Traces the light of the nearest surfaces of a translucent body that is not glass. Its other surfaces in the
-// same pixel get the same light.
-void Stage::Impl::trace_body(const TranslucentBody& body, const View& view, const SampleOffsets& offsets) {
-  if (!light_pass.begin_part(picture.depth, body.area_px)) return;
-  glDisable(GL_BLEND);
-  glDepthMask(GL_TRUE);
-  if (body.cloth)
-    cloth_pass.draw_surface(*body.cloth);
-  else
-    mesh_pass.draw_translucent(body.instance, MeshPass::Shading::surface);
-  light_pass.trace_body(light_sources, view, offsets);
-  glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
-  glEnable(GL_BLEND);
-  glDepthMask(GL_FALSE);
-}
-
-void Stage::Impl::draw_body(const TranslucentBody& body, const View& view, const FrameUniforms& frame,
-                            const SampleOffsets& offsets) {
-  if (!body.glass) trace_body(body, view, offsets);
-  lay_streaks_behind(body.looked_px, frame);
-  if (body.glass && particles_behind_glass) picture.behind.update(picture.color, body.looked_px);
-  if (body.glass) glDisable(GL_BLEND);
+// Draws a translucent body in its traced light, and also into the picture without particles.
+void Stage::Impl::draw_in_light(const TranslucentBody& body) {
   const auto draw = [&](bool particles) {
     using enum MeshPass::Shading;
     if (body.cloth)
@@ -361,12 +339,55 @@ void Stage::Impl::draw_body(const TranslucentBody& body, const View& view, const
   if (particles_behind_glass) {
     glBindFramebuffer(GL_FRAMEBUFFER, picture.bodies_framebuffer);
     draw(false);
-    glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
   }
-  const bool writes_depth = body.glass || body.cloth;
-  if (writes_depth) glDepthMask(GL_TRUE);
-  draw(particles_behind_glass);
-  if (writes_depth) picture.depth_copy.change(body.area_px);
+  glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
+  if (body.glass) glDepthMask(GL_TRUE);
+  draw(body.glass && particles_behind_glass);
+}
+
+// Draws a translucent body that is not glass from back to front in layers: the parts of its surface that are
+// first, second ... on the lines of sight, counted from the back. Each layer is drawn in its own light. What
+// remains in front of the last layer is drawn at once in the light of its nearest surface.
+void Stage::Impl::draw_layers(const TranslucentBody& body, const View& view, const SampleOffsets& offsets) {
+  // More layers cost more than a tenth of a frame, and are rare except in crumpled cloth.
+  constexpr int kMostLayers = 2;
+  GLuint behind = picture.depth;
+  for (int k = 0; k <= kMostLayers; ++k) {
+    const bool rest = k == kMostLayers;
+    if (!(rest ? light_pass.begin_part(behind, body.area_px) : light_pass.begin_layer(behind, body.area_px)))
+      break;
+    if (body.cloth)
+      cloth_pass.draw_surface(*body.cloth);
+    else
+      mesh_pass.draw_translucent(body.instance, MeshPass::Shading::layer);
+    const GLuint layer = light_pass.trace_body(light_sources, view, offsets);
+    if (layer == 0) break;
+    picture.test_against(rest ? behind : layer);
+    glDepthFunc(rest ? GL_GREATER : GL_EQUAL);
+    glDepthMask(GL_FALSE);
+    glEnable(GL_BLEND);
+    draw_in_light(body);
+    behind = layer;
+  }
+  picture.test_against(picture.depth);
+  glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
+  glDepthFunc(GL_GREATER);
+  if (!body.cloth) return;
+  glDepthMask(GL_TRUE);
+  cloth_pass.draw_depth(*body.cloth);
+}
+
+void Stage::Impl::draw_body(const TranslucentBody& body, const View& view, const FrameUniforms& frame,
+                            const SampleOffsets& offsets) {
+  lay_streaks_behind(body.looked_px, frame);
+  if (body.glass) {
+    if (particles_behind_glass) picture.behind.update(picture.color, body.looked_px);
+    glDisable(GL_BLEND);
+    draw_in_light(body);
+  } else {
+    draw_layers(body, view, offsets);
+  }
+  if (body.glass || body.cloth) picture.depth_copy.change(body.area_px);
   picture.behind.change(body.area_px);
   glEnable(GL_BLEND);
   glDepthMask(GL_FALSE);

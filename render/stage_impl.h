@@ -49,6 +49,12 @@ struct Stage::Impl {
           depth_copy(GL_DEPTH_COMPONENT32F, GL_NEAREST, kSceneDepthUnit, width_px, height_px),
           behind(GL_RGBA32F, GL_LINEAR, kBehindUnit, width_px, height_px) {}
 
+    /// Sets the depth buffer against which objects are tested.
+    void test_against(GLuint other) const {
+      for (const GLuint target : {GLuint(framebuffer), GLuint(bodies_framebuffer)})
+        if (target != 0) glNamedFramebufferTexture(target, GL_DEPTH_ATTACHMENT, other, 0);
+    }
+
     /// Begins the picture without particles: copies the opaque objects to it.
     void begin_bodies(int width_px, int height_px) {
       if (bodies == 0) {
@@ -148,7 +154,8 @@ struct Stage::Impl {
   void draw_run(const PaintOrder::Run& run, const View& view, const FrameUniforms& frame);
   void draw_body(const TranslucentBody& body, const View& view, const FrameUniforms& frame,
                  const SampleOffsets& offsets);
-  void trace_body(const TranslucentBody& body, const View& view, const SampleOffsets& offsets);
+  void draw_in_light(const TranslucentBody& body);
+  void draw_layers(const TranslucentBody& body, const View& view, const SampleOffsets& offsets);
   void lay_streaks_behind(const Eigen::AlignedBox2i& area_px, const FrameUniforms& frame);
   void draw_lines(const View& view);
   void add_picture(const FrameUniforms& frame, HdrImage& sum);

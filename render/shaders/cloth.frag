@@ -17,12 +17,9 @@ void main() {
 #ifdef TEXTURED
   opacity *= texture(base_color_texture, texture_place(uv)).a;
 #endif
-#ifdef SURFACE
-  float alpha = opacity;  // without dither, because all layers take the light of the nearest one
-#else
-  float alpha = alpha_of(cover_of(opacity, dot(n, view)), uv);
-#endif
-  if (alpha == 0.0) discard;
+  if (opacity == 0.0) discard;
+  float alpha = opacity;
+  if (normal.w > 0.0) alpha = 1.0 - pow(1.0 - opacity, 1.0 / max(dot(n, view), 0.1));  // more fibres cover a slanted view; not at the rim
 #endif
 #ifdef SURFACE
   vec3 middle = position - normal.xyz * normal.w;

@@ -4,7 +4,7 @@
 #define NONE
 #define FRAME_FIELDS(qualifier) \
   qualifier vec4 eye;               /* w: size of a pixel at distance 1 */ \
-  qualifier vec4 sun_direction;     /* w: seed of the dither */ \
+  qualifier vec4 sun_direction; \
   qualifier vec4 sun_radiance;      /* of a white surface that faces it; w: radius of the disc [rad] */ \
   qualifier vec4 zenith;            /* w: fog density */ \
   qualifier vec4 horizon; \
@@ -17,7 +17,7 @@ layout(std140, binding = 0) uniform Frame {
   FRAME_FIELDS(NONE)
   vec4 ray_center, ray_x, ray_y;  // direction through a point of the screen: center + x * ndc.x + y * ndc.y
   vec4 depth;             // distance along the view axis = x / (depth + y); z: near plane
-  vec4 air;               // time [s], fraction of clouds, number of sub-frames
+  vec4 air;               // time [s], fraction of clouds
 } uniforms;
 
 // llvmpipe's fragment shaders read a uniform lane by lane, with forty instructions (Mesa 22.3), which was half of the
@@ -42,8 +42,3 @@ void pass_frame() {
 #endif
 
 float saturate(float x) { return clamp(x, 0.0, 1.0); }
-
-// A threshold in [0, 1) for each pixel, by the R2 sequence of M. Roberts, whose mean over a few neighbours is even.
-float dither(vec2 pixel, float shift) {
-  return fract(dot(floor(pixel), vec2(0.75487767, 0.56984029)) + shift);
-}

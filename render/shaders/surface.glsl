@@ -2,6 +2,9 @@
 layout(location = 0) out vec4 surface_place;    // position; w: roughness, + 2 if it mirrors, + 4 on cloth, + 8 if it is metal
 layout(location = 1) out vec4 surface_normals;  // smooth normal, normal of the triangle
 layout(location = 2) out vec4 surface_color;    // only in quick pictures; see plain.frag
+#ifdef LAYER
+layout(binding = 28) uniform sampler2D depth_behind;  // depth of the objects behind this layer of a translucent body
+#endif
 
 vec2 octahedral(vec3 n) {
   n /= abs(n.x) + abs(n.y) + abs(n.z);
@@ -17,4 +20,8 @@ void write_surface(vec3 place, vec3 n, vec3 face, vec3 view, float kind) {
   surface_place = vec4(place, kind);
   surface_normals = vec4(octahedral(n), octahedral(face));
   surface_color = vec4(0.0);
+#ifdef LAYER
+  // The layer behind has this depth, which must not exceed itself by rounding.
+  if (gl_FragCoord.z <= 1.000001 * texelFetch(depth_behind, ivec2(gl_FragCoord.xy), 0).r) discard;
+#endif
 }

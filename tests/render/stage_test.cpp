@@ -403,6 +403,33 @@ TEST(Stage, NearerBlendedSurfaceCoversTheFartherOne) {
   }
 }
 
+TEST(Stage, NearerPartOfABlendedMeshCoversTheFartherOne) {
+  const auto add_square = [](Mesh& mesh, float z, const Vector4f& color) {
+    const auto first = static_cast<uint32_t>(mesh.positions.size());
+    for (const Vector2f& corner : {Vector2f(-1, -1), Vector2f(1, -1), Vector2f(1, 1), Vector2f(-1, 1)}) {
+      mesh.positions.emplace_back(corner.x(), corner.y(), z);
+      mesh.normals.emplace_back(0, 0, 1);
+      mesh.uvs.push_back(corner);
+      mesh.colors.push_back(color);
+    }
+    for (const uint32_t corner : {0u, 1u, 2u, 0u, 2u, 3u}) mesh.indices.push_back(first + corner);
+  };
+  const Material material{.color = {1, 1, 1, 1}, .unlit = true, .vertex_colors = true, .vertex_alpha = true};
+  std::array<float, 3> layers = {-0.5f, 0, 0.5f};
+  do {
+    Mesh mesh;
+    for (const float z : layers)
+      add_square(mesh, z,
+                 z < 0   ? Vector4f(1, 0, 0, 0.5f)
+                 : z > 0 ? Vector4f(0, 0, 1, 0.5f)
+                         : Vector4f(0, 1, 0, 0.5f));
+    SmallStage s;
+    s.add(mesh, material);
+    EXPECT_LT((center_pixel(s.draw()) - Vector4f(0.125f, 0.25f, 0.5f, 0.875f)).norm(), 0.01f)
+        << layers[0] << " " << layers[1];
+  } while (std::ranges::next_permutation(layers).found);
+}
+
 TEST(Stage, AddedLightCoversNothing) {
   SmallStage s;
   s.add(make_box({3, 3, 0.1f}), glowing({0.3f, 0.3f, 0.3f}), {0, 0, -2});
