@@ -227,13 +227,20 @@ void LightTracer::meet_particles(float length, Path& path, FoundLight& found) co
   path.fraction *= met.transmittance;
 }
 
-// Returns the light of lamps on a white surface, by one shadow ray. One lamp is chosen at random, in
-// proportion to its light without shadows.
+// Returns the light of lamps on a white surface. `each`: by a shadow ray to each of them, if there are few;
+// else by one shadow ray to a lamp that is chosen at random, in proportion to its light without shadows.
 Vector3f LightTracer::lamps_at(const Vector3f& place, const Vector3f& normal, const Vector3f& face,
-                               PixelSampler& sampler) const {
+                               PixelSampler& sampler, bool each) const {
+  constexpr std::size_t kFewLamps = 8;
   if (sources_.lamps.empty()) return Vector3f::Zero();
+  each = each && sources_.lamps.size() <= kFewLamps;
   WeightedChoice choice(sampler.next().x);
   const SquarePoint<float> uv = sampler.next();
+  const auto visible = [&](const RayLamp& lamp, const LampPoint<float>& point) {
+    if (!lamp.def().shadows) return Vector3f(Vector3f::Ones());
+    return scene_.transmittance(place, to_eigen(point.towards), point.distance);
+  };
+  Vector3f sum = Vector3f::Zero();
   const RayLamp* kept = nullptr;
   LampPoint<float> kept_point{};
   float kept_cosine = 0;
@@ -242,16 +249,16 @@ Vector3f LightTracer::lamps_at(const Vector3f& place, const Vector3f& normal, co
     const Vector3f towards = to_eigen(point.towards);
     const float cosine = std::max(normal.dot(towards), 0.0f);
     const float weight = cosine * to_eigen(point.arriving).sum();
-    if (!(weight > 0) || face.dot(towards) <= 0 || !choice.take(weight)) continue;
+    if (!(weight > 0) || face.dot(towards) <= 0) continue;
+    if (each) sum += cosine * to_eigen(point.arriving).cwiseProduct(visible(lamp, point));
+    if (each || !choice.take(weight)) continue;
     kept = &lamp;
     kept_point = point;
     kept_cosine = cosine;
   }
-  if (kept == nullptr) return Vector3f::Zero();
-  const Vector3f visible =
-      kept->def().shadows ? scene_.transmittance(place, to_eigen(kept_point.towards), kept_point.distance)
-                          : Vector3f(Vector3f::Ones());
-  return to_eigen(kept_point.arriving).cwiseProduct(visible) * (kept_cosine * choice.sum() / choice.weight());
+  if (kept == nullptr) return sum;
+  return to_eigen(kept_point.arriving).cwiseProduct(visible(*kept, kept_point)) *
+         (kept_cosine * choice.sum() / choice.weight());
 }
 
 int VisibleLight::find(const Hit& hit) const {
@@ -296,7 +303,7 @@ bool LightTracer::follow_glass(const Hit& hit, const RaySurface& surface, PixelS
   if (surface.transmission <= 0) return false;
   const Vector3f albedo = surface.color.head<3>();
   if (hit.front && surface.transmission < 1) {
-    const Vector3f light = direct_light(hit, off_surface(hit.position, hit.face), sampler).sum() +
+    const Vector3f light = direct_light(hit, off_surface(hit.position, hit.face), sampler, false).sum() +
                            sources_.open_air.at(hit.normal);
     found.noisy += (1 - surface.transmission) * path.fraction.cwiseProduct(albedo).cwiseProduct(light);
     path.fraction *= surface.transmission;
@@ -307,6 +314,7 @@ bool LightTracer::follow_glass(const Hit& hit, const RaySurface& surface, PixelS
   if (forks) {
     --path.forks;
     Path branch = path;
+    branch.shown = nullptr;
     branch.fraction *= mirrored;
     branch.turn(mirrored_direction, hit);
     found.add(radiance(branch, sampler, visible));
@@ -374,14 +382,14 @@ Vector3f LightTracer::highlights(const Hit& hit, float roughness, const Vector3f
 
 // Returns the light of sun, lamps and glowing meshes on a white surface.
 LightTracer::DirectLight LightTracer::direct_light(const Hit& hit, const Vector3f& from,
-                                                   PixelSampler& sampler) const {
+                                                   PixelSampler& sampler, bool each_lamp) const {
   DirectLight result;
   const float towards_sun = hit.normal.dot(sources_.sky.sun_direction);
   const SquarePoint<float> on_sun = sampler.next();
   if (towards_sun > 0 && sources_.sun.intensity > 0)
     result.sun = (sources_.sun.intensity * towards_sun * sun_visibility(from, on_sun))
                      .cwiseProduct(sources_.sun.color);
-  result.lamps = lamps_at(from, hit.normal, hit.face, sampler);
+  result.lamps = lamps_at(from, hit.normal, hit.face, sampler, each_lamp);
   result.glow = glow_at(from, hit.lamp_normal, hit.face, sampler);
   return result;
 }
@@ -458,6 +466,7 @@ void LightTracer::add_varnish(const Hit& hit, const RaySurface& surface, const V
   Path branch = path;
   branch.branched = true;
   branch.splits = 1;
+  branch.shown = nullptr;
   branch.fraction = path.fraction.cwiseProduct(mirrored);
   const float a = surface.roughness * surface.roughness;
   branch.by_chance |= a >= kSharp;
@@ -564,15 +573,15 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
                  .cwiseProduct(glow_at(path.from, hit.lamp_normal, hit.face, sampler));
     } else if (!sharp) {  // all fractions are equal
       sum += path.fraction.cwiseProduct(response.around)
-                 .cwiseProduct(direct_light(hit, path.from, sampler).sum());
+                 .cwiseProduct(direct_light(hit, path.from, sampler, false).sum());
     } else {
-      const DirectLight direct = direct_light(hit, path.from, sampler);
+      const DirectLight direct = direct_light(hit, path.from, sampler, true);
       sum += path.fraction.cwiseProduct(response.sun.cwiseProduct(direct.sun) +
                                         response.lamps.cwiseProduct(direct.lamps) +
                                         response.around.cwiseProduct(direct.glow));
     }
     path.fraction = path.fraction.cwiseProduct(response.around);
-    if (path.splits > 1) {
+    if (path.splits > 1 || path.shown != nullptr) {
       split(hit, path, sampler, light);
       return light;
     }
@@ -589,20 +598,29 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
   return light;
 }
 
-// Adds the light of several paths from a diffuse surface.
+// Adds the light of several paths from a diffuse surface, or stores their mean with the surface.
 void LightTracer::split(const Hit& hit, const Path& path, PixelSampler& sampler, FoundLight& light) const {
   const SquarePoint<float> first = sampler.next();
+  const float share = 1 / static_cast<float>(path.splits);
+  FoundLight around;
+  float inverse_distance = 0;
   for (int k = 0; k < path.splits; ++k) {
     const Vector3f outgoing =
         to_eigen(cosine_direction(from_eigen(hit.normal), lattice_point(first, k, path.splits)));
     Path part = path;
     part.splits = 1;
+    part.shown = nullptr;
     part.bounces = 1;
     part.cone = 0.5f;
-    part.fraction /= static_cast<float>(path.splits);
+    part.fraction = Vector3f::Ones();  // faint paths end early, which would cause bright dots
     part.scatter(hit.normal, outgoing.dot(hit.face) > 0 ? outgoing : reflected(outgoing, hit.face));
-    light.add(radiance(part, sampler));
+    float met = kFar;
+    around.add(radiance(part, sampler, nullptr, &met), Vector3f::Constant(share));
+    inverse_distance += share / std::max(met, 8 * path.width);
   }
+  if (path.shown == nullptr) return light.add(around, path.fraction);
+  LightSums sums;
+  path.shown->add({hit.position, hit.normal, path.fraction, around.limited(sums), inverse_distance});
 }
 
 // The arriving fraction of the sky's light is the sum over the rays without a hit, divided by the sum over

@@ -77,6 +77,9 @@ struct LightTracer::Path {
   int bounces = 0;        ///< number of diffuse surfaces that radiance() has followed the path from
   bool branched = false;  ///< whether the path is the mirror image of a varnished surface in a picture
   int splits = 1;         ///< number of paths that leave the first diffuse surface
+  /// If not null, the first diffuse surface and its indirect light are stored there, and the light is not
+  /// part of the result.
+  MirroredSurface* shown = nullptr;
   /// Number of glass surfaces, before the first diffuse surface, at which both the reflected and the
   /// refracted path are followed.
   int forks = 0;

@@ -18,7 +18,7 @@ constexpr int kPenumbraRays = 6, kPenumbraRaysOfMany = 2;
 constexpr std::size_t kMostGlowRays = 3;  // shadow rays of a pixel to glowing meshes in a sub-frame
 // Further rounds are traced where variance / mean^2 of the filtered indirect light exceeds the target. The
 // filter averages at most kMostAveraged cells.
-constexpr float kTargetVariance = 0.0256f, kMostAveraged = 400;
+constexpr float kTargetVariance = 0.01f, kMostAveraged = 400, kSmallVariance = 0.5f;
 constexpr float kBrightest =
     50;  // limit of radiance found by random directions; brighter samples would be visible as dots
 constexpr int kWidestStep = 16;  // widest step of the filter of indirect light [cells]
@@ -332,12 +332,16 @@ void LightTracer::refine_cells(const SurfaceBuffer& surfaces, const LightNoise& 
   const int most = std::min(kRoundsPerSubFrame * view.offsets.count, kMostRounds);
   light.sums += sum_over_rows(cells.height_px, [&](int y, LightSums& sums) {
     for (int x = 0; x < cells.width_px; x += kLanes) {
-      const float excess = noise.relative_variance(x, y) - 1;
+      const float variance = noise.relative_variance(x, y);
+      // Most light has a small variance. Its noise is visible only where few cells are averaged, as at edges
+      // between walls.
+      const float excess = std::max(variance - 1, std::min(variance, kSmallVariance));
       if (excess <= 0) continue;
       const Lanes one = Lanes{} + 1;
       const Lanes reach2 = cells.inverse_size2.lanes(x, y) / larger(light.reach2.lanes(x, y), one * 1e-20f);
-      const Lanes averaged =
-          larger(cells.similar_around(x, y) * smaller(3 * reach2, one * kMostAveraged), one);
+      const Lanes averaged = larger(
+          (variance > 1 ? cells.similar_around(x, y) : one * 0.5f) * smaller(3 * reach2, one * kMostAveraged),
+          one);
       const Lanes rounds = excess / (kTargetVariance * averaged);
       for (int round = 1; round <= most; ++round) {
         const IntLanes active = (cells.filled.lanes(x, y) > 0.0f) & (rounds > static_cast<float>(round));

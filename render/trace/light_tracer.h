@@ -10,6 +10,7 @@
 #include "render/file_io.h"
 #include "render/trace/light_filter.h"
 #include "render/trace/light_sources.h"
+#include "render/trace/mirrored_surfaces.h"
 #include "render/trace/ray_scene.h"
 
 namespace offstage::render {
@@ -146,11 +147,17 @@ class LightTracer {
     float background = 0;  ///< fraction of a transparent background that is visible along the path
     /// Returns the sum of both parts, the noisy one limited to a maximum brightness. Adds to `sums`.
     Vector3f limited(LightSums& sums) const;
-    /// Adds the light of another path to the same point.
-    void add(const FoundLight& more) {
-      noisy += more.noisy;
-      certain += more.certain;
+    /// Adds a fraction of the light of another path to the same point.
+    void add(const FoundLight& more, const Vector3f& fraction = Vector3f::Ones()) {
+      noisy += fraction.cwiseProduct(more.noisy);
+      certain += fraction.cwiseProduct(more.certain);
     }
+  };
+  /// Light that comes through glass.
+  struct ThroughGlass {
+    FoundLight light;         ///< without the indirect light of `shown`
+    MirroredSurface shown;    ///< the diffuse surface behind the glass
+    bool is_frosted = false;  ///< whether the glass spreads the light
   };
   FoundLight radiance(Path path, PixelSampler& sampler, const VisibleLight* visible = nullptr,
                       float* met = nullptr) const;
@@ -174,22 +181,25 @@ class LightTracer {
     Vector3f sun = Vector3f::Zero(), lamps = Vector3f::Zero(), glow = Vector3f::Zero();
     Vector3f sum() const { return sun + lamps + glow; }
   };
-  DirectLight direct_light(const Hit& hit, const Vector3f& from, PixelSampler& sampler) const;
+  DirectLight direct_light(const Hit& hit, const Vector3f& from, PixelSampler& sampler, bool each_lamp) const;
   Vector3f glow_at(const Vector3f& place, const Vector3f& normal, const Vector3f& face,
                    PixelSampler& sampler) const;
   LaneVectors trace_glow(const Points& points, int x, int y, const LightView& view) const;
   Vector3f lamps_at(const Vector3f& place, const Vector3f& normal, const Vector3f& face,
-                    PixelSampler& sampler) const;
+                    PixelSampler& sampler, bool each) const;
   Vector3f sun_visibility(const Vector3f& place, const SquarePoint<float>& uv) const;
   Lanes sun_visibility(const LaneVectors& place, IntLanes active, const SquarePoint<Lanes>& uv,
                        RayScene::Focus focus, LaneVectors& colored) const;
-  FoundLight light_through(const Point& point, const LightView& view, PixelSampler& sampler,
-                           const VisibleLight& visible, bool from_background) const;
+  ThroughGlass light_through(const Point& point, const LightView& view, PixelSampler& sampler,
+                             const VisibleLight& visible, bool from_background) const;
+  void average_frosted(const SurfaceBuffer& surfaces, const LightPlane& frosted, const LightView& view,
+                       GlassBuffer& glass) const;
   Vector3f mirrored_light(const Point& point, const LightView& view, PixelSampler& sampler,
-                          const VisibleLight& visible, LightSums& sums, int rays, int splits) const;
+                          const VisibleLight& visible, LightSums& sums, int rays, int splits,
+                          MirroredSurface* shown = nullptr) const;
   Vector3f mirrored_along(const Point& point, const Vector3f& facet, const LightView& view,
-                          PixelSampler& sampler, const VisibleLight& visible, LightSums& sums,
-                          int splits) const;
+                          PixelSampler& sampler, const VisibleLight& visible, LightSums& sums, int splits,
+                          MirroredSurface* shown) const;
   void lift(const Points& points, IntLanes lanes, const LightView& view, LaneVectors& place) const;
   struct LampLight;
   struct Highlights;

@@ -314,6 +314,36 @@ TEST_F(TracedLight, BehindTheRimOfAGlassBallHasLittleNoise) {
             0.25f);  // 0.18; with one path 0.35
 }
 
+// The indirect light of what a mirror shows is filtered as that of what is directly visible.
+TEST_F(TracedLight, ALampLitRoomHasLittleNoiseInAMirror) {
+  for (const float side : {-1.0f, 1.0f}) {
+    s.add(make_box({0.1f, 4, 8}), kGrey, {2 * side, 0, 0});
+    s.add(make_box({4, 0.1f, 8}), kGrey, {0, 1.5f * side, 0});
+    s.add(make_box({4, 4, 0.1f}), kGrey, {0, 0, 4 * side});
+  }
+  s.add(make_sphere(0.5f), kGrey, {0.8f, -1, -1});
+  s.add(make_box({2, 1.6f, 0.04f}), {.color = {1, 1, 1, 1}, .metallic = 1, .roughness = 0}, {0, 0, -3.9f});
+  std::vector<Lamp> lamps;
+  for (const float x : {-1.0f, 0.0f, 1.0f})
+    lamps.push_back({.position = {x, 1.2f, 0.5f}, .intensity = {2, 2, 2}, .radius = 0.1f});
+  s.stage.set_lamps(lamps);
+  look({.eye = {0, 0, 2}, .target = {0, 0, -4}, .fov_deg = 50});
+  const HdrImage picture = mean_of(s, 4), reference = mean_of(s, 64);
+  EXPECT_LT(relative_error(picture, reference, {Eigen::Vector2i(64, 50), Eigen::Vector2i(96, 74)}),
+            0.1f);  // 0.06; without filter 0.35
+}
+
+TEST_F(TracedLight, FrostedGlassHasLittleNoise) {
+  s.add(make_box({12, 12, 0.1f}), kGrey, {0, 0, -2});
+  s.add(make_sphere(0.4f), {.color = {0.02f, 0.02f, 0.02f, 1}, .roughness = 1}, {0.3f, 0, -1});
+  s.add(make_box({2, 2, 0.05f}), {.color = {1, 1, 1, 1}, .roughness = 0.35f, .transmission = 1});
+  s.stage.set_environment(even_sky(0.3f));
+  s.stage.set_lamps(std::array{Lamp{.position = {-2, 3, 2}, .intensity = {20, 20, 20}, .radius = 0.3f}});
+  look({.eye = {0, 0.3f, 4}, .target = {0, 0, 0}, .fov_deg = 32});
+  const HdrImage picture = mean_of(s, 4), reference = mean_of(s, 64);
+  EXPECT_LT(relative_error(picture, reference, {Eigen::Vector2i(60, 40), Eigen::Vector2i(110, 80)}), 0.1f);
+}
+
 // The furnace for particles: inside a closed ball, they have the light of its wall, whatever the sky outside.
 TEST_F(TracedLight, ParticlesIndoorsHaveTheLightOfTheWalls) {
   Environment sky = even_sky(2);
