@@ -227,38 +227,42 @@ void LightTracer::meet_particles(float length, Path& path, FoundLight& found) co
   path.fraction *= met.transmittance;
 }
 
-// Returns the light of lamps on a white surface. `each`: by a shadow ray to each of them, if there are few;
-// else by one shadow ray to a lamp that is chosen at random, in proportion to its light without shadows.
-Vector3f LightTracer::lamps_at(const Vector3f& place, const Vector3f& normal, const Vector3f& face,
-                               PixelSampler& sampler, bool each) const {
+// Returns the origin of a shadow ray from a surface in a picture; see lift().
+Vector3f LightTracer::start_of_shadow(const Hit& hit, const Vector3f& from, const Vector3f& towards) const {
+  return hit.is_cloth || hit.face.dot(towards) >= kGrazing ? from : scene_.smooth_place(hit);
+}
+
+// Returns the light of lamps on a white surface. `in_picture`: by a shadow ray to each of them, if there are
+// few; else by one shadow ray to a lamp that is chosen at random, in proportion to its light without shadows.
+Vector3f LightTracer::lamps_at(const Hit& hit, const Vector3f& from, PixelSampler& sampler,
+                               bool in_picture) const {
   constexpr std::size_t kFewLamps = 8;
   if (sources_.lamps.empty()) return Vector3f::Zero();
-  each = each && sources_.lamps.size() <= kFewLamps;
+  const bool each = in_picture && sources_.lamps.size() <= kFewLamps;
   WeightedChoice choice(sampler.next().x);
   const SquarePoint<float> uv = sampler.next();
-  const auto visible = [&](const RayLamp& lamp, const LampPoint<float>& point) {
-    if (!lamp.def().shadows) return Vector3f(Vector3f::Ones());
-    return scene_.transmittance(place, to_eigen(point.towards), point.distance);
+  const auto light = [&](const RayLamp& lamp, const LampPoint<float>& point) {
+    const Vector3f towards = to_eigen(point.towards);
+    const Vector3f arriving = std::max(hit.normal.dot(towards), 0.0f) * to_eigen(point.arriving);
+    if (!lamp.def().shadows) return arriving;
+    const Vector3f start = in_picture ? start_of_shadow(hit, from, towards) : from;
+    return Vector3f(arriving.cwiseProduct(scene_.transmittance(start, towards, point.distance)));
   };
   Vector3f sum = Vector3f::Zero();
   const RayLamp* kept = nullptr;
   LampPoint<float> kept_point{};
-  float kept_cosine = 0;
   for (const RayLamp& lamp : sources_.lamps) {
-    const LampPoint<float> point = lamp.point(from_eigen(place), uv);
+    const LampPoint<float> point = lamp.point(from_eigen(from), uv);
     const Vector3f towards = to_eigen(point.towards);
-    const float cosine = std::max(normal.dot(towards), 0.0f);
-    const float weight = cosine * to_eigen(point.arriving).sum();
-    if (!(weight > 0) || face.dot(towards) <= 0) continue;
-    if (each) sum += cosine * to_eigen(point.arriving).cwiseProduct(visible(lamp, point));
+    const float weight = std::max(hit.normal.dot(towards), 0.0f) * to_eigen(point.arriving).sum();
+    const bool behind = hit.face.dot(towards) <= 0 && (hit.is_cloth || !in_picture);
+    if (!(weight > 0) || behind) continue;
+    if (each) sum += light(lamp, point);
     if (each || !choice.take(weight)) continue;
     kept = &lamp;
     kept_point = point;
-    kept_cosine = cosine;
   }
-  if (kept == nullptr) return sum;
-  return to_eigen(kept_point.arriving).cwiseProduct(visible(*kept, kept_point)) *
-         (kept_cosine * choice.sum() / choice.weight());
+  return kept == nullptr ? sum : Vector3f(light(*kept, kept_point) * (choice.sum() / choice.weight()));
 }
 
 int VisibleLight::find(const Hit& hit) const {
@@ -380,16 +384,19 @@ Vector3f LightTracer::highlights(const Hit& hit, float roughness, const Vector3f
   return sum;
 }
 
-// Returns the light of sun, lamps and glowing meshes on a white surface.
+// Returns the light of sun, lamps and glowing meshes on a white surface. `in_picture`: whether a mirror or
+// glass shows the surface.
 LightTracer::DirectLight LightTracer::direct_light(const Hit& hit, const Vector3f& from,
-                                                   PixelSampler& sampler, bool each_lamp) const {
+                                                   PixelSampler& sampler, bool in_picture) const {
   DirectLight result;
   const float towards_sun = hit.normal.dot(sources_.sky.sun_direction);
   const SquarePoint<float> on_sun = sampler.next();
-  if (towards_sun > 0 && sources_.sun.intensity > 0)
-    result.sun = (sources_.sun.intensity * towards_sun * sun_visibility(from, on_sun))
+  if (towards_sun > 0 && sources_.sun.intensity > 0) {
+    const Vector3f start = in_picture ? start_of_shadow(hit, from, sources_.sky.sun_direction) : from;
+    result.sun = (sources_.sun.intensity * towards_sun * sun_visibility(start, on_sun))
                      .cwiseProduct(sources_.sun.color);
-  result.lamps = lamps_at(from, hit.normal, hit.face, sampler, each_lamp);
+  }
+  result.lamps = lamps_at(hit, from, sampler, in_picture);
   result.glow = glow_at(from, hit.lamp_normal, hit.face, sampler);
   return result;
 }

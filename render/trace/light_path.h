@@ -37,6 +37,9 @@ Vector3f light_of_glow(const GlowSample& sample, const Vector3f& normal, const V
 /// Probability density of uniformly distributed directions [1/sr].
 inline constexpr float kEvenDensity = 0.25f / std::numbers::pi_v<float>;
 
+/// Cosine between light and triangle, below which the triangle may shadow itself.
+inline constexpr float kGrazing = 0.02f;
+
 /// Surfaces with a smaller roughness^2 reflect and refract in a single direction.
 inline constexpr float kSharp = 0.002f;
 

@@ -181,12 +181,13 @@ class LightTracer {
     Vector3f sun = Vector3f::Zero(), lamps = Vector3f::Zero(), glow = Vector3f::Zero();
     Vector3f sum() const { return sun + lamps + glow; }
   };
-  DirectLight direct_light(const Hit& hit, const Vector3f& from, PixelSampler& sampler, bool each_lamp) const;
+  DirectLight direct_light(const Hit& hit, const Vector3f& from, PixelSampler& sampler,
+                           bool in_picture) const;
   Vector3f glow_at(const Vector3f& place, const Vector3f& normal, const Vector3f& face,
                    PixelSampler& sampler) const;
   LaneVectors trace_glow(const Points& points, int x, int y, const LightView& view) const;
-  Vector3f lamps_at(const Vector3f& place, const Vector3f& normal, const Vector3f& face,
-                    PixelSampler& sampler, bool each) const;
+  Vector3f lamps_at(const Hit& hit, const Vector3f& from, PixelSampler& sampler, bool in_picture) const;
+  Vector3f start_of_shadow(const Hit& hit, const Vector3f& from, const Vector3f& towards) const;
   Vector3f sun_visibility(const Vector3f& place, const SquarePoint<float>& uv) const;
   Lanes sun_visibility(const LaneVectors& place, IntLanes active, const SquarePoint<Lanes>& uv,
                        RayScene::Focus focus, LaneVectors& colored) const;

@@ -470,6 +470,12 @@ Vector3f RayScene::smooth_place(const Vector3f& eye, const Vector3f& place) cons
   return object->smoothed(ray.hit.primID, eye, offset / length);
 }
 
+Vector3f RayScene::smooth_place(const Hit& hit) const {
+  const Object& object = objects_[hit.object];
+  if (object.mesh == nullptr) return hit.position;
+  return object.smoothed(hit.triangle, hit.position - hit.distance * hit.direction, hit.direction);
+}
+
 Vector3f RayScene::transmittance(const Vector3f& from, const Vector3f& direction, float length,
                                  Focus focus) const {
   RTCRay ray;

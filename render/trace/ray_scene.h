@@ -144,6 +144,8 @@ class RayScene {
   /// normals of its triangle describe (J. Hanika, "Hacking the Shadow Terminator", 2021). Returns points of
   /// other objects unchanged.
   Vector3f smooth_place(const Vector3f& eye, const Vector3f& place) const;
+  /// The same for the point that a ray hit.
+  Vector3f smooth_place(const Hit& hit) const;
 
  private:
   struct Object;

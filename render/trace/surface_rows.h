@@ -20,8 +20,6 @@ namespace offstage::render {
 inline constexpr float kSmoothLobe = 0.1f;
 /// Roughness above which mirror images are filtered.
 inline constexpr float kSharpMirror = 0.12f;
-/// Cosine between light and triangle, below which the triangle may shadow itself.
-inline constexpr float kGrazing = 0.02f;
 
 /// Returns unit vectors from octahedral coordinates.
 inline LaneVectors from_octahedral(Lanes x, Lanes z) {

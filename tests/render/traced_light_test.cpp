@@ -657,18 +657,27 @@ TEST_F(TracedLight, ABallOfGlassTurnsThePictureUpsideDown) {
 }
 
 // On a coarse ball with smooth normals, brightness falls towards the terminator as on a true one, although
-// the triangles there turn away from the sun.
+// the triangles there turn away from the sun. A mirror shows the same.
 TEST_F(TracedLight, OfACoarseSmoothBallFallsEvenlyTowardsItsTerminator) {
   const float turn = 10 * std::numbers::pi_v<float> / 180;
   s.stage.set_sun({.direction = {std::cos(turn), 0, std::sin(turn)}, .intensity = 1, .size_deg = 0.1f});
   s.add(make_sphere(1, 12), {.color = {1, 1, 1, 1}, .roughness = 1});
+  // `eye`: from which the ball, or its mirror image, is seen along the Z axis.
+  const auto expect_cosines = [&](const Camera& eye, bool mirrored) {
+    const HdrImage picture = mean_of(s, 16);
+    for (float angle = 30; angle < 100; angle += 4) {  // from the sun
+      const float a = angle * std::numbers::pi_v<float> / 180 + turn;
+      Vector2f place = project(eye, {0.99f * std::cos(a), 0.1f, 0.99f * std::sin(a)}, 160, 120);
+      if (mirrored) place.x() = 160 - place.x();
+      EXPECT_NEAR(mean_around(picture, place, 1), std::max(std::cos(a - turn), 0.0f), 0.08f)
+          << angle << (mirrored ? " mirrored" : "");
+    }
+  };
   look({.eye = {0, 0, 4}, .target = {0, 0, 0}, .fov_deg = 35});
-  const HdrImage picture = mean_of(s, 16);
-  for (float angle = 30; angle < 100; angle += 4) {  // from the sun
-    const float a = angle * std::numbers::pi_v<float> / 180 + turn;
-    const Vector2f place = place_of({0.99f * std::cos(a), 0.1f, 0.99f * std::sin(a)});
-    EXPECT_NEAR(mean_around(picture, place, 1), std::max(std::cos(a - turn), 0.0f), 0.08f) << angle;
-  }
+  expect_cosines(camera, false);
+  s.add(make_box({4, 4, 0.1f}), {.color = {1, 1, 1, 1}, .metallic = 1, .roughness = 0}, {0, 0, 8.05f});
+  look({.eye = {0, 0, 4}, .target = {0, 0, 8}, .fov_deg = 12});
+  expect_cosines({.eye = {0, 0, 12}, .target = {0, 0, 0}, .fov_deg = 12}, true);
 }
 
 TEST_F(TracedLight, SumsCountTheLightRemovedFromVeryBrightRays) {
