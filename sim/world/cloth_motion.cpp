@@ -73,14 +73,20 @@ void ClothMotion::begin_substep(Real time, Real h, BodyReactions& reactions, Ste
   if (system_.empty()) loads_.clear();
 }
 
-/// Returns the bodies that cloths may touch in a sub-step of length h, and the bodies that hold pins.
-std::vector<ClothBody> ClothMotion::bodies_near_cloths(Real h) const {
-  std::vector<uint8_t> holds(world_.bodies.slot_count(), 0);
+/// Returns by slot whether a body holds pins, or cloth has pulled it in the last sub-steps.
+std::vector<uint8_t> ClothMotion::loaded_bodies() const {
+  std::vector<uint8_t> loaded(world_.bodies.slot_count(), 0);
   world_.cloths.for_each([&](ClothHandle, const std::unique_ptr<Cloth>& cloth) {
     for (const ClothPin& pin : cloth->pins)
-      if (pin.body) holds[pin.body.index] = 1;
+      if (pin.body) loaded[pin.body.index] = 1;
   });
-  for (const auto& entry : loads_) holds[entry.first] = 1;
+  for (const auto& entry : loads_) loaded[entry.first] = 1;
+  return loaded;
+}
+
+/// Returns the bodies that cloths may touch in a sub-step of length h, and the bodies that hold pins.
+std::vector<ClothBody> ClothMotion::bodies_near_cloths(Real h) const {
+  const std::vector<uint8_t> holds = loaded_bodies();
   const Aabb around = system_.reach(h);
   std::vector<ClothBody> near;
   world_.bodies.for_each([&](BodyHandle handle, const std::unique_ptr<Body>& body) {
@@ -152,13 +158,16 @@ void ClothMotion::find_pressed(std::span<ContactPair* const> pairs) {
   for (Body* body : uncovered) active_.wake(*body);
 }
 
-/// Lets bodies with joints that cloth pulled in the last sub-step move as the joints permit.
+/// Lets bodies with joints that hold cloth, or that cloth pulled in the last sub-step, move as the joints
+/// permit. Pins pull from the first sub-step on, when no load is known yet: a light body that moved freely in
+/// this sub-step would be far from where the joints hold it.
 void ClothMotion::set_joints(std::span<ClothBody> near, Real h, const BodyReactions& reactions) const {
+  const std::vector<uint8_t> loaded = loaded_bodies();
   for (ClothBody& at : near) {
     const uint32_t slot = at.obstacle().body;
+    if (!loaded[slot] || !at.is_dynamic()) continue;
     const auto load = loads_.find(slot);
-    if (load == loads_.end() || !at.is_dynamic()) continue;
-    const Vec6 push = h * stacked(load->second.force.last());
+    const Vec6 push = load == loads_.end() ? Vec6(Vec6::Zero()) : Vec6(h * stacked(load->second.force.last()));
     std::vector<ClothBody::Connected> connected;
     const std::map<uint32_t, Mat6> responses = reactions.link_responses(slot, push);
     if (responses.empty()) continue;

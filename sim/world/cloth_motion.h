@@ -59,11 +59,13 @@ class ClothMotion {
     std::vector<PairLayer::Place> places;
   };
 
+  std::vector<uint8_t> loaded_bodies() const;
   std::vector<ClothBody> bodies_near_cloths(Real h) const;
   void find_pressed(std::span<ContactPair* const> pairs);
   bool is_between(const PressedCloth& pressed) const;
   void wake_unpinned(std::span<const ClothBody> near);
   void set_joints(std::span<ClothBody> near, Real h, const BodyReactions& reactions) const;
+  void name_first_tears(Real start);
   void record_loads(std::span<const ClothBody> near, Real h);
   std::vector<Reaction> answer(std::span<const ClothBody> near, Real h, BodyReactions& reactions);
   void push_supports(const ClothBody& at, std::vector<Reaction>& reactions);

@@ -415,17 +415,20 @@ void Simulation::note(const sim::StepReport& report) {
   }
 
   if (report.finite) return;
-  bool is_cloth = false;
+  const sim::ClothDef* cloth = nullptr;
   world_.for_each_cloth([&](sim::ClothHandle handle) {
-    is_cloth |=
-        !world_.cloth_report(handle).finite && world_.cloth_def(handle).name == report.non_finite.object;
+    const sim::ClothDef& def = world_.cloth_def(handle);
+    if (!world_.cloth_report(handle).finite && def.name == report.non_finite.object) cloth = &def;
   });
+  const char* advice = "Reduce world.step or the forces";
+  if (cloth)
+    advice = cloth->integrator == sim::ClothIntegrator::implicit
+                 ? "Reduce its \"substep\", or make it less stiff"
+                 : "Reduce its \"substep\", use \"integrator\": \"implicit\", or make it less stiff";
   throw DivergedError(
       fmt::format(
           "the simulation diverged at {:.4f} s: {}'{}' has a position or velocity that is not finite. {}",
-          world_.time(), is_cloth ? "cloth " : "", report.non_finite.object,
-          is_cloth ? "Reduce its \"substep\", use \"integrator\": \"implicit\", or make it less stiff"
-                   : "Reduce world.step or the forces"),
+          world_.time(), cloth ? "cloth " : "", report.non_finite.object, advice),
       state_dump(report.non_finite));
 }
 
