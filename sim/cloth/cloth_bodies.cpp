@@ -279,9 +279,9 @@ Vec3 ClothBody::shorten(Real fraction, const Vec3& drift) {
   return change.head<3>();
 }
 
-Mat6 Carrier::carried(const ClothPoints& cloth) const {
+Mat6 Carrier::carried(const ClothPoints& cloth, const Vec3& centre) const {
   Mat6 matrix = Mat6::Zero();
-  for (uint32_t i : points) add_point_mass(cloth.mass[i], cloth.at(i) - body->centre(), matrix);
+  for (uint32_t i : points) add_point_mass(cloth.mass[i], cloth.at(i) - centre, matrix);
   return matrix;
 }
 

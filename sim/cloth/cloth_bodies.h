@@ -214,9 +214,13 @@ struct Carrier {
   ClothBody* body;
   std::vector<uint32_t> points;
   std::vector<Vec3> places;  ///< position of each point, in the body's frame [m]
+  /// Impulse and angular impulse of the inertia and the weight of the points that displace the body in the
+  /// cloth's sub-step, and those of the springs of cloth with the integrator `relaxed`; see apply_loads().
+  Vec6 inertia = Vec6::Zero(), early = Vec6::Zero();
 
-  /// Mass matrix of the points about the body's centre.
-  Mat6 carried(const ClothPoints& points) const;
+  /// Mass matrix of the points about the body's centre, or about another one.
+  Mat6 carried(const ClothPoints& cloth) const { return carried(cloth, body->centre()); }
+  Mat6 carried(const ClothPoints& cloth, const Vec3& centre) const;
   /// Moves the points with the body to the end of the cloth's sub-step.
   void place(ClothPoints& points) const;
   /// Applies an impulse to the body and its points, and moves the points. `moving`: the part of the impulse

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "sim/cloth/cloth_system.h"
+#include "sim/cloth/pinned_bodies.h"
 
 namespace offstage::sim {
 
@@ -40,7 +41,7 @@ void ClothSystem::find_held(Real time, std::span<ClothBody> bodies) {
 
 void ClothSystem::attach(uint32_t point, ClothBody& body, const Vec3& place) {
   auto at = std::ranges::find(carriers_, &body, &Carrier::body);
-  if (at == carriers_.end()) at = carriers_.insert(at, {&body, {}, {}});
+  if (at == carriers_.end()) at = carriers_.insert(at, {.body = &body, .points = {}, .places = {}});
   at->points.push_back(point);
   at->places.push_back(place);
   points_.carried[point] = 1;
@@ -72,29 +73,64 @@ void ClothSystem::move_held() {
 /// the impulse that accelerates these points.
 void ClothSystem::apply_pin_impulses_to_bodies(Real dt) {
   const auto impulse_on = [&](uint32_t i) {
-    const Vec4 load = points_.pin_impulse[i] / dt + dt * points_.mass[i] * points_.acceleration[i];
+    const Vec4 impulse = points_.pin_impulse[i] / dt;
     points_.pin_impulse[i].setZero();
-    return Vec3(load.head<3>());
+    return Vec3(impulse.head<3>());
   };
   for (const Carrier& carrier : carriers_) {
-    ClothBody& body = *carrier.body;
-    Vec6 sum = Vec6::Zero(), moving = Vec6::Zero();
+    const ClothBody& body = *carrier.body;
+    auto [sum, moving] = inertia_of(carrier, dt);
     for (uint32_t i : carrier.points) {
-      const Vec3 p = points_.at(i), arm = p - body.centre();
-      const Vec3 load = impulse_on(i);
-      // The part of the lag that is due to a constant acceleration displaces by half of its impulse, too.
-      const Vec3 lag = points_.mass[i] * (points_.velocity[i].head<3>() - body.velocity_now(p));
-      const Vec3 impulse = load + lag, early = fraction_at_once(points_.cloth[i], dt) * load + lag +
-                                               points_.mass[i] / 2 * body.steady_change(p);
-      sum += (Vec6() << impulse, arm.cross(impulse)).finished();
-      moving += (Vec6() << early, arm.cross(early)).finished();
+      const Vec3 p = points_.at(i), arm = p - body.centre(), load = impulse_on(i);
+      const Vec6 impulse = stacked(load, arm.cross(load));
+      sum += impulse;
+      // With `relaxed`, the body has moved in the steps of the springs, with carrier.early.
+      if (cloths_[points_.cloth[i]]->def.integrator != ClothIntegrator::relaxed)
+        moving += fraction_at_once(points_.cloth[i], dt) * impulse;
       points_.velocity[i] = padded(body.velocity_now(p));
     }
-    carrier.apply_loads(sum, moving, points_);
+    carrier.apply_loads(sum, moving + carrier.early, points_);
   }
   for (const Held& held : held_)
-    if (held.body && !held.body->is_dynamic())
-      held.body->record_pin_impulse(impulse_on(held.point), points_.at(held.point));
+    if (held.body && !held.body->is_dynamic()) {
+      const Vec4 weight = dt * points_.mass[held.point] * points_.acceleration[held.point];
+      held.body->record_pin_impulse(impulse_on(held.point) + weight.head<3>(), points_.at(held.point));
+    }
+}
+
+/// Returns the impulse and angular impulse of the weight and the inertia of a body's pinned points, and the
+/// part of them that displaces the body in this sub-step. The lag is the impulse that the points need to move
+/// with the body.
+std::pair<Vec6, Vec6> ClothSystem::inertia_of(const Carrier& carrier, Real dt) const {
+  const ClothBody& body = *carrier.body;
+  Vec6 sum = Vec6::Zero(), moving = Vec6::Zero();
+  for (uint32_t i : carrier.points) {
+    const Vec3 p = points_.at(i), arm = p - body.centre();
+    const Vec3 weight = dt * points_.mass[i] * points_.acceleration[i].head<3>();
+    const Vec3 lag = points_.mass[i] * (points_.velocity[i].head<3>() - body.velocity_now(p));
+    // The part of the lag that is due to a constant acceleration displaces by half of its impulse, too.
+    const Vec3 impulse = weight + lag, early = fraction_at_once(points_.cloth[i], dt) * weight + lag +
+                                               points_.mass[i] / 2 * body.steady_change(p);
+    sum += stacked(impulse, arm.cross(impulse));
+    moving += stacked(early, arm.cross(early));
+  }
+  return {sum, moving};
+}
+
+/// Prepares the bodies for the steps of the springs, in which they move.
+void ClothSystem::begin_carriers(Real dt) {
+  for (Carrier& carrier : carriers_) {
+    carrier.inertia = inertia_of(carrier, dt).second;
+    carrier.early.setZero();
+  }
+}
+
+/// Finds the longest steps of the springs for the bodies to which they are pinned.
+void ClothSystem::find_pin_steps() {
+  pin_step_.assign(cloths_.size(), kInfinity);
+  for (std::size_t c = 0; c < cloths_.size(); ++c)
+    if (cloths_[c]->def.integrator == ClothIntegrator::relaxed && !cloths_[c]->def.soften)
+      pin_step_[c] = longest_pin_step(points_, springs_of(c), carriers_);
 }
 
 /// Returns the fraction of the springs' impulses that moves bodies already in this sub-step.

@@ -12,6 +12,7 @@
 #include "sim/cloth/bend_limit.h"
 #include "sim/cloth/bending.h"
 #include "sim/cloth/cloth.h"
+#include "sim/cloth/cloth_bodies.h"
 #include "sim/cloth/cloth_points.h"
 #include "sim/cloth/cloth_springs.h"
 #include "sim/cloth/gas_force.h"
@@ -26,7 +27,8 @@ struct ClothRange {
   ClothBending& bending;
   AirDrag& air;
   GasForce& gas;
-  BendLimit* bend_limit;  ///< null: none
+  BendLimit* bend_limit;       ///< null: none
+  std::span<Carrier> carriers;  ///< the dynamic bodies that hold points of any cloth
 
   /// Returns the supports of this cloth's points.
   std::span<Support> supports(ClothPoints& points) const {

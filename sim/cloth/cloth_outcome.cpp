@@ -64,6 +64,7 @@ void ClothSystem::tear_within(const ClothWeather& weather, Real fraction) {
   for (std::size_t c = 0; c < cloths_.size(); ++c) add_outer_forces(*cloths_[c], first_[c], now, points_);
   adapt_springs();
   find_held(weather.time, bodies_);
+  find_pin_steps();
   contacts_.find(points_, collides_, bodies_, weather.h, fraction);
 }
 

@@ -84,6 +84,7 @@ void ClothSystem::begin_step(const ClothWeather& weather, std::span<ClothBody> b
   for (Cloth* cloth : cloths_) cloth->before = cloth->points;
   adapt_springs();
   find_held(weather.time, bodies);
+  find_pin_steps();
   for (const Carrier& carrier : carriers_) carrier.body->accelerate_steadily(weather.gravity);
   contacts_.set_up(-weather.gravity);
   contacts_.find(points_, collides_, bodies, weather.h);
@@ -188,7 +189,8 @@ void ClothSystem::apply_air(Real dt, Real left) {
 /// Returns the number of steps of the springs in a sub-step of a cloth with the integrator `relaxed`.
 uint32_t ClothSystem::spring_steps(std::size_t cloth, Real dt) const {
   if (cloths_[cloth]->def.soften) return 1;
-  const Real longest = std::max(springs_[cloth].longest_step(), kShortestSpringStep);
+  const Real longest =
+      std::max(std::min(springs_[cloth].longest_step(), pin_step_[cloth]), kShortestSpringStep);
   return static_cast<uint32_t>(std::max(1.0, std::ceil(dt / longest * (1 - 1e-6))));
 }
 
@@ -197,12 +199,13 @@ void ClothSystem::integrate(Real dt) {
   // again.
   for (const Held& held : held_)
     if (held.body) points_.start[held.point] = padded(held.body->start().point_to_world(held.position));
+  begin_carriers(dt);
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     const ClothIntegrator integrator = cloths_[c]->def.integrator;
-    const ClothRange range{first_[c],       first_[c] + cloths_[c]->points.size(),
-                           springs_of(c),   cloths_[c]->bending,
-                           air_[c],         gas_[c],
-                           bend_limit_of(c)};
+    const ClothRange range{first_[c],        first_[c] + cloths_[c]->points.size(),
+                           springs_of(c),    cloths_[c]->bending,
+                           air_[c],          gas_[c],
+                           bend_limit_of(c), carriers_};
     if (c > 0)  // cloths that were integrated before may have moved the bodies
       update_supports(range);
     if (integrator == ClothIntegrator::symplectic) step_symplectic(points_, range, dt);

@@ -7,6 +7,7 @@
 
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "sim/cloth/air_drag.h"
@@ -111,7 +112,10 @@ class ClothSystem {
   void find_held(Real time, std::span<ClothBody> bodies);
   void attach(uint32_t point, ClothBody& body, const Vec3& place);
   void set_clamps(std::size_t cloth);
+  void find_pin_steps();
   void move_held();
+  std::pair<Vec6, Vec6> inertia_of(const Carrier& carrier, Real dt) const;
+  void begin_carriers(Real dt);
   void apply_pin_impulses_to_bodies(Real dt);
   Real fraction_at_once(std::size_t cloth, Real dt) const;
   void push_holders(Real dt);
@@ -164,6 +168,7 @@ class ClothSystem {
 
   ClothPoints points_;
   std::vector<ClothSprings> springs_;   // by `relaxed` cloth
+  std::vector<Real> pin_step_;          // by cloth: the longest step of its springs for its pins [s]
   std::vector<AirDrag> air_;            // by cloth
   std::vector<GasForce> gas_;           // by cloth
   std::vector<BendLimit> bend_limits_;  // one for each cloth with such a limit

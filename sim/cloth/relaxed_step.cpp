@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "sim/cloth/cloth_integrators.h"
+#include "sim/cloth/pinned_bodies.h"
 #include "sim/cloth/spring_run.h"
 #include "sim/cloth/support_bodies.h"
 
@@ -267,8 +268,10 @@ bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& sp
   }
   bool solved = true;
   RelaxedSupports supports(points, cloth, steps, h);
+  PinnedBodies pinned(points, cloth, steps, h);
   for (uint32_t step = 0; step < steps; ++step) {
     supports.begin_step(step);
+    pinned.begin_step(points);
     if (bends) bending->apply(points, step, points.moves);
     gas.apply(points, points.moves);
     springs.apply(points, points.moves);
@@ -282,6 +285,7 @@ bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& sp
       supports.hold_up();
     }
     supports.end_step();
+    pinned.end_step(points, step);
     for (std::size_t i = 0; i < n; ++i) {
       const Vec4 move = moves[i];
       x[i] += move;
