@@ -182,6 +182,7 @@ struct ClothTear {
   Real stretch = 0;           ///< length of the spring divided by its rest length
   bool by_pressure = false;   ///< whether the cloth is closed and under pressure
   bool touches_body = false;  ///< whether the cloth touched a body in that sub-step
+  BodyHandle body{};          ///< the one of these bodies that was nearest to the tear
 };
 
 /// The gas inside of a closed cloth.

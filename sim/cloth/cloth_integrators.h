@@ -27,7 +27,7 @@ struct ClothRange {
   ClothBending& bending;
   AirDrag& air;
   GasForce& gas;
-  BendLimit* bend_limit;       ///< null: none
+  BendLimit* bend_limit;        ///< null: none
   std::span<Carrier> carriers;  ///< the dynamic bodies that hold points of any cloth
 
   /// Returns the supports of this cloth's points.

@@ -74,10 +74,36 @@ uint32_t ClothSystem::tear_at(std::size_t c, Real time) {
   Cloth& cloth = *cloths_[c];
   ClothTear first{.time = time};
   first.by_pressure = cloth.def.pressure != 0;
-  first.touches_body = contacts_.touched(c);
   const uint32_t torn = tear(cloth, first);
+  if (torn > 0 && cloth.first_tear->time == time && !cloth.first_tear->body) {
+    const ClothBody* const body = touching_body(c, cloth.first_tear->place);
+    cloth.first_tear->touches_body = body != nullptr;
+    if (body) cloth.first_tear->body.index = body->obstacle().body;
+  }
   cloth.report.first_tear = cloth.first_tear;
   return torn;
+}
+
+/// Returns the body nearest to `place` of those that touched cloth in this sub-step of the world and reach to
+/// this cloth; null: none. A body that only holds its pins does not count.
+const ClothBody* ClothSystem::touching_body(std::size_t c, const Vec3& place) const {
+  Aabb around;
+  for (const Vec3& p : cloths_[c]->points) around.extend(p);
+  const Vec3 margin = Vec3::Constant(2 * cloths_[c]->def.thickness);
+  around = Aabb(around.min() - margin, around.max() + margin);
+  const ClothBody* nearest = nullptr;
+  Real least = kInfinity;
+  for (const ClothBody& body : bodies_) {
+    const bool reaches = std::holds_alternative<Plane>(*body.solid().shape) ||
+                         body.obstacle().swept_bounds().intersects(around);
+    if (!body.touched || !body.collides || !reaches) continue;
+    if (std::ranges::find(points_.holder, &body) != points_.holder.end()) continue;
+    const Real distance = signed_distance(body.solid(), body.end().point_to_body(place)).distance;
+    if (distance >= least) continue;
+    least = distance;
+    nearest = &body;
+  }
+  return nearest;
 }
 
 void ClothSystem::count_penetration() {

@@ -152,6 +152,7 @@ class ClothSystem {
   bool any_tears() const;
   void tear_within(const ClothWeather& weather, Real fraction);
   uint32_t tear_at(std::size_t cloth, Real time);
+  const ClothBody* touching_body(std::size_t cloth, const Vec3& place) const;
   void stop(Cloth& cloth, std::size_t first);
   void stop_diverged(Real dt);
   void count_penetration();

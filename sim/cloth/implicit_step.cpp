@@ -1,9 +1,11 @@
+#include <algorithm>
 #include <utility>
 
 #include "sim/cloth/cloth_bodies.h"
 #include "sim/cloth/cloth_integrators.h"
 #include "sim/cloth/spring_run.h"
 #include "sim/cloth/support_bodies.h"
+#include "sim/linear/mobility_root.h"
 
 namespace offstage::sim {
 namespace {
@@ -21,8 +23,10 @@ constexpr Real kSupportTolerance = 1e-3;
 
 /// The linear system of an implicit step of cloth by backward Euler (step_implicit()). Its matrix consists of
 /// the masses, the matrix of bending, and a block alpha u u^T + beta 1 for each spring, between its ends. The
-/// unknowns are the velocities of the points, followed by the gains of velocity and angular velocity of each
-/// body under a support. A point that rests on a support has the velocity of the support along the normal.
+/// unknowns are the velocities of the points, followed by six values y for each body under a support. The
+/// body gains the velocity and the angular velocity L y, with its mobility W = L L^T. Joints make W singular,
+/// so it has no inverse; with y, the matrix of the body is the unit matrix. A point that rests on a support
+/// has the velocity of the support along the normal.
 class ImplicitSystem {
  public:
   ImplicitSystem(const ClothPoints& points, const ClothRange& cloth, const SupportBodies& bodies, Real h)
@@ -57,7 +61,7 @@ class ImplicitSystem {
     }
     for (Mat3& b : block_) b = b.inverse().eval();
     for (std::size_t k = 0; k < bodies.count(); ++k)
-      inertia_.push_back(bodies.body(k).mobility(Mat6::Zero()).inverse());
+      body_factor_.push_back(mobility_root(bodies.body(k).mobility(Mat6::Zero())));
     body_block_.resize(bodies.count());
   }
 
@@ -69,12 +73,12 @@ class ImplicitSystem {
   /// Sets the points that rest on their supports.
   void set_resting(std::vector<Resting> resting) {
     resting_ = std::move(resting);
-    body_block_ = inertia_;
+    std::ranges::fill(body_block_, Mat6::Identity());
     for (const auto& [s, index] : resting_) {
       const uint32_t body = bodies_.body_of(index);
       if (body == SupportBodies::kNone) continue;
       const Vec3 normal = s->normal.head<3>();
-      const Vec6 row = (Vec6() << normal, bodies_.arm(index).cross(normal)).finished();
+      const Vec6 row = body_factor_[body].transpose() * stacked(normal, bodies_.arm(index).cross(normal));
       body_block_[body] += row * row.transpose() / normal.dot(block_[s->point - cloth_.begin] * normal);
     }
     for (Mat6& b : body_block_) b = b.inverse().eval();
@@ -90,19 +94,14 @@ class ImplicitSystem {
   Real surface_gain(std::size_t k, const Support& support, const SpringRun& v) const {
     const uint32_t body = bodies_.body_of(k);
     if (body == SupportBodies::kNone) return 0;
-    const std::size_t at = size_ + 2 * body;
-    return support.normal.head<3>().dot(v[at].head<3>() + v[at + 1].head<3>().cross(bodies_.arm(k)));
+    const Vec6 gain = body_factor_[body] * of_body(body, v);
+    return support.normal.head<3>().dot(gain.head<3>() + gain.tail<3>().cross(bodies_.arm(k)));
   }
 
   /// Computes y = A p.
   void multiply_all(const SpringRun& p, SpringRun& y) const {
     for (std::size_t i = 0; i < size_; ++i) y[i] = points_.mass[cloth_.begin + i] * p[i];
-    for (std::size_t k = 0; k < inertia_.size(); ++k) {
-      const Vec6 momentum =
-          inertia_[k] * (Vec6() << p[size_ + 2 * k].head<3>(), p[size_ + 2 * k + 1].head<3>()).finished();
-      y[size_ + 2 * k] = padded(momentum.head<3>());
-      y[size_ + 2 * k + 1] = padded(momentum.tail<3>());
-    }
+    for (std::size_t i = size_; i < size(); ++i) y[i] = p[i];
     for (std::size_t i = 0; i < drag_.size(); ++i) y[i] += dragged(i, p[i]);
     for (std::size_t k = 0; k < links_.size(); ++k) {
       const ClothSpring& s = cloth_.springs[k];
@@ -133,8 +132,9 @@ class ImplicitSystem {
       at -= normal;
       const uint32_t body = bodies_.body_of(index);
       if (body == SupportBodies::kNone) continue;
-      y[size_ + 2 * body] += normal;
-      y[size_ + 2 * body + 1] += padded(bodies_.arm(index).cross(normal.head<3>()));
+      const Vec3 impulse = normal.head<3>();
+      add_to_body(body, body_factor_[body].transpose() * stacked(impulse, bodies_.arm(index).cross(impulse)),
+                  y);
     }
   }
   /// Gives points that rest on supports the motion of these along the normals, for velocities without it.
@@ -176,11 +176,8 @@ class ImplicitSystem {
     for (std::size_t i = 0; i < size_; ++i) z[i] = padded(block_[i] * r[i].head<3>());
     clear_given(z);
     for (std::size_t k = 0; k < body_block_.size(); ++k) {
-      Vec4 &linear = z[size_ + 2 * k], &angular = z[size_ + 2 * k + 1];
-      const Vec6 gain =
-          body_block_[k] * (Vec6() << r[size_ + 2 * k].head<3>(), r[size_ + 2 * k + 1].head<3>()).finished();
-      linear = padded(gain.head<3>());
-      angular = padded(gain.tail<3>());
+      z[size_ + 2 * k] = z[size_ + 2 * k + 1] = Vec4::Zero();
+      add_to_body(k, body_block_[k] * of_body(k, r), z);
     }
     if (!body_block_.empty()) follow_bodies(z);
   }
@@ -209,6 +206,15 @@ class ImplicitSystem {
   }
 
  private:
+  /// The unknowns of a body.
+  Vec6 of_body(std::size_t body, const SpringRun& v) const {
+    return stacked(v[size_ + 2 * body].head<3>(), v[size_ + 2 * body + 1].head<3>());
+  }
+  void add_to_body(std::size_t body, const Vec6& value, SpringRun& v) const {
+    v[size_ + 2 * body] += padded(value.head<3>());
+    v[size_ + 2 * body + 1] += padded(value.tail<3>());
+  }
+
   struct Link {
     Vec4 direction;
     Real along, across, force;
@@ -220,8 +226,8 @@ class ImplicitSystem {
   std::size_t size_;  // number of points
   Real bending_;      // factor of the matrix of bending
   std::vector<Resting> resting_;
-  std::vector<Mat6> inertia_;     // by body: with the contacts on which it rests
-  std::vector<Mat6> body_block_;  // by body: inverse of its diagonal block with the points that rest on it
+  std::vector<Mat6> body_factor_;  // by body: L of its mobility L L^T, with the contacts on which it rests
+  std::vector<Mat6> body_block_;   // by body: inverse of its diagonal block with the points that rest on it
   std::vector<Link> links_;
   std::vector<Mat3> block_;  // by point: inverse of its diagonal block
   std::vector<Mat3> drag_;   // by point; empty without air

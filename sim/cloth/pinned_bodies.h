@@ -1,6 +1,6 @@
 #pragma once
-/// Dynamic bodies that hold points of a cloth by pins, in a sub-step of the integrator `relaxed`. They move in
-/// each step of the springs. If a body followed only after the sub-step, the springs would pull it too far
+/// Dynamic bodies that hold points of a cloth by pins, in a sub-step of the integrator `relaxed`. They move
+/// in each step of the springs. If a body followed only after the sub-step, the springs would pull it too far
 /// where the cloth that they move in a sub-step is heavier than the body, or has a greater moment of inertia.
 
 #include <cstddef>

@@ -167,7 +167,8 @@ void ClothMotion::set_joints(std::span<ClothBody> near, Real h, const BodyReacti
     const uint32_t slot = at.obstacle().body;
     if (!loaded[slot] || !at.is_dynamic()) continue;
     const auto load = loads_.find(slot);
-    const Vec6 push = load == loads_.end() ? Vec6(Vec6::Zero()) : Vec6(h * stacked(load->second.force.last()));
+    const Vec6 push =
+        load == loads_.end() ? Vec6(Vec6::Zero()) : Vec6(h * stacked(load->second.force.last()));
     std::vector<ClothBody::Connected> connected;
     const std::map<uint32_t, Mat6> responses = reactions.link_responses(slot, push);
     if (responses.empty()) continue;
@@ -196,9 +197,20 @@ void ClothMotion::step(Real start, Real h, std::span<ContactPair* const> pairs, 
   }
   const std::vector<const ForceDef*> forces = world_.active_forces();
   system_.step({start, h, world_.def.gravity, world_.def.wind, forces}, near);
+  name_first_tears(start);
   wake_unpinned(near);
   reactions.apply(answer(near, h, reactions), start + h, report);
   record_loads(near, h);
+}
+
+/// Completes the handles of the bodies that tore cloths since the time `start`. ClothSystem knows the slots.
+void ClothMotion::name_first_tears(Real start) {
+  world_.cloths.for_each([&](ClothHandle, const std::unique_ptr<Cloth>& cloth) {
+    std::optional<ClothTear>& tear = cloth->first_tear;
+    if (!tear || !tear->touches_body || tear->body || !(tear->time > start)) return;
+    tear->body = world_.bodies.at_slot(tear->body.index);
+    cloth->report.first_tear = tear;
+  });
 }
 
 /// Records the forces of cloths on bodies, and which of these rest on other bodies.

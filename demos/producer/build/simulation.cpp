@@ -113,7 +113,9 @@ void Simulation::note_cloths() {
       sim::Real& least = totals_.softened_cloths.try_emplace(name, 1).first->second;
       least = std::min(least, report.least_stiffness);
     }
-    if (report.first_tear) totals_.first_tears.try_emplace(name, *report.first_tear);
+    if (!report.first_tear || totals_.first_tears.contains(name)) return;
+    const sim::BodyHandle body = report.first_tear->body;
+    totals_.first_tears[name] = {*report.first_tear, body ? world_.body_def(body).name : ""};
   });
 }
 

@@ -41,7 +41,10 @@ struct SimulationTotals : sim::StepFigures {
   std::vector<std::string> lost_bodies;    ///< bodies that left the world's bounds and were frozen there
   /// For each cloth with reduced stiffness: the smallest factor of the stiffness of a spring.
   std::map<std::string, sim::Real> softened_cloths;
-  std::map<std::string, sim::ClothTear> first_tears;
+  struct FirstTear : sim::ClothTear {
+    std::string body_name;  ///< of ClothTear::body; empty: none
+  };
+  std::map<std::string, FirstTear> first_tears;  ///< by cloth
   /// For each body with approximate contact forces: the number of fall-backs of its solver.
   std::map<std::string, uint64_t> rough_bodies;
   double first_rough_s = 0;  ///< time of the first fall-back [s]

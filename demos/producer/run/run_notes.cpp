@@ -48,7 +48,7 @@ std::vector<std::string> notes_of(const SimulationTotals& t) {
         fmt::format("note: cloth '{}' first tore at {:.3f} s at ({:.3g}, {:.3g}, {:.3g}): a thread was "
                     "{:.3g} times its rest length, under {}",
                     cloth, tear.time, tear.place.x(), tear.place.y(), tear.place.z(), tear.stretch,
-                    tear.touches_body  ? "the load of a body that it touched"
+                    tear.touches_body ? fmt::format("the load of body '{}', which touches it", tear.body_name)
                     : tear.by_pressure ? "its pressure"
                                        : "its own load"));
   const auto add = [&](uint64_t count, const char* what) {
