@@ -31,9 +31,9 @@ void clear_surfaces(GLuint framebuffer) {
   glClearNamedFramebufferfv(framebuffer, GL_COLOR, 1, flat.data());
 }
 
-/// Moves the first corner of a part of the picture to a multiple of kGrid_px. The samples of a pixel depend on
-/// its place in the part. They complement those of the other sub-frames only if the part begins at the same
-/// pixel, although its objects move a little.
+/// Moves the first corner of a part of the picture to a multiple of kGrid_px. The samples of a pixel depend
+/// on its place in the part. They complement those of the other sub-frames only if the part begins at the
+/// same pixel, although its objects move a little.
 Eigen::AlignedBox2i on_grid(const Eigen::AlignedBox2i& part_px) {
   constexpr int kGrid_px = 16;
   return {Eigen::Vector2i(part_px.min().array() / kGrid_px * kGrid_px), part_px.max()};
