@@ -198,7 +198,9 @@ bool LightPass::crop_to_surfaces() {
     seen.extend(Eigen::Vector2i(static_cast<int>(past - row.begin()), y + 1));
   }
   if (seen.isEmpty()) return false;
-  part_px_ = on_grid({part_px_.min() + seen.min(), part_px_.min() + seen.max()});
+  const Eigen::AlignedBox2i cropped = on_grid({part_px_.min() + seen.min(), part_px_.min() + seen.max()});
+  if (cropped.isApprox(part_px_)) return true;
+  part_px_ = cropped;
   read_surfaces(part_px_, surfaces_);
   return true;
 }

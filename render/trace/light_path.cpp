@@ -627,7 +627,8 @@ void LightTracer::split(const Hit& hit, const Path& path, PixelSampler& sampler,
   }
   if (path.shown == nullptr) return light.add(around, path.fraction);
   LightSums sums;
-  path.shown->add({hit.position, hit.normal, path.fraction, around.limited(sums), inverse_distance});
+  const Vector3f limited = around.limited(sums);
+  path.shown->add({hit.position, hit.normal, path.fraction, limited, inverse_distance, sums});
 }
 
 // The arriving fraction of the sky's light is the sum over the rays without a hit, divided by the sum over

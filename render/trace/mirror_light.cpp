@@ -9,8 +9,8 @@
 namespace offstage::render {
 namespace {
 
-// Number of paths that leave the diffuse surfaces in a mirror image that is not filtered, or behind glass.
-// Frames of many sub-frames need few.
+// Number of paths that leave the diffuse surfaces in a smooth mirror or behind glass. Frames of many
+// sub-frames need few.
 constexpr int kMirrorSplits = 4, kMirrorSplitsOfMany = 1;
 constexpr int kWidest = 16, kWidestOfMany = 8;  // see MirroredSurfaces::filter
 constexpr int kGlassForks = 2;                  // see Path::forks
@@ -134,6 +134,7 @@ void LightTracer::trace_mirrors(const SurfaceBuffer& surfaces, const LightView& 
                                many ? kMirrorSplitsOfMany : kMirrorSplits, sums, &surface),
             1;
         shown.set(x + i, y, surface);
+        sums += surface.sums;
       }
     }
   });
@@ -241,6 +242,7 @@ void LightTracer::trace_glass(const SurfaceBuffer& surfaces, int x0, int y0, con
             !sources_.sky_is_visible && behind.opacity(behind.pixel(x0 + x + i, y0 + y)) == 0;
         const ThroughGlass through = light_through(point, view, sampler, behind, from_background);
         shown.set(x + i, y, through.shown);
+        sums += through.shown.sums;
         *frosted.at(x + i, y) = through.is_frosted ? 1.0f : 0.0f;
         if (through.is_frosted) has_frosted = true;
         glass.mirrored[pixel] << mirrored, through.light.background;

@@ -12,8 +12,11 @@ LightPlane plane_like(const LightGuide& guide) {
 }  // namespace
 
 void MirroredSurface::add(const MirroredSurface& more) {
+  sums += more.sums;
   if (fraction.isZero()) {
+    const LightSums all = sums;
     *this = more;
+    sums = all;
     return;
   }
   const Eigen::Vector3f total = fraction + more.fraction;

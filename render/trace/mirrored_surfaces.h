@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 
+#include "render/stage.h"
 #include "render/trace/light_filter.h"
 
 namespace offstage::render {
@@ -16,6 +17,7 @@ struct MirroredSurface {
   Eigen::Vector3f fraction = Eigen::Vector3f::Zero();
   Eigen::Vector3f around = Eigen::Vector3f::Zero();  ///< indirect light, as the radiance of a white surface
   float inverse_distance = 0;  ///< mean of 1 / length of the rays that found the light [1/m]
+  LightSums sums;              ///< over the rays that found the light
 
   /// Adds the surface that another ray of the same pixel found; the place is that of the first one.
   void add(const MirroredSurface& more);
